@@ -16,7 +16,6 @@ from blast_env.evaluation.cases import (
     fixed_charges,
     one_of_each_charge,
     search_set,
-    visible_case,
 )
 from blast_env.layout.build_site import draw_threat
 from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
@@ -118,8 +117,10 @@ class Definition:
         source = scenario.charge[number]
         alone = scenario.model_copy(update={"charge": (source,)})
         charge = draw_threat(alone, seed)
-        judged = visible_case(scenario, charge, [seed])
-        return replace(judged, search_set=search_set(scenario, charge))
+        threats = (LoadCase(charge, seed),)
+        return LoadCaseSet(
+            scenario, threats, charge=charge, search_set=search_set(scenario, charge)
+        )
 
     def _hidden(self) -> LoadCaseSet:
         scenario = self.scenario

@@ -14,12 +14,14 @@ from blast_env.cli.options import (
     FinalCellOption,
     FinalCellsOption,
     GivenCharge,
+    GlazingOption,
     LayoutOption,
     MassErrorOption,
     RequireOption,
     ScenarioArgument,
     TargetOption,
     TntOption,
+    WallOption,
     refuse_given,
     resume_words,
     wanted_level,
@@ -113,12 +115,8 @@ def assess(
         help="Remove pieces that overturn before the blast is over, and run it again.",
     ),
     require: RequireOption = None,
-    glazing: str | None = typer.Option(
-        None, help="Windows of protected structures that have no facade, a component."
-    ),
-    wall: str | None = typer.Option(
-        None, help="Walls of protected structures that have no facade, a component."
-    ),
+    glazing: GlazingOption = None,
+    wall: WallOption = None,
     picture: Path | None = writes(
         "Picture of the facades under the worst charge; of the stand-offs as rings (--screen)",
         *PICTURES,

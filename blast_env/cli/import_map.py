@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import typer
 
 from blast_env.cli.command import PICTURES, writes
-from blast_env.cli.options import numbers
+from blast_env.cli.options import GlazingOption, WallOption, numbers
 from blast_env.cli.output import (
     print_json,
     print_line,
@@ -105,10 +105,8 @@ def import_map(
     zone_around_m: float | None = typer.Option(
         None, "--zone-around", help="Width of a zone around the protected buildings, m."
     ),
-    glazing: str | None = typer.Option(
-        None, help="Windows of protected buildings without any in the file, a component."
-    ),
-    wall: str | None = typer.Option(None, help="Their walls, a component."),
+    glazing: GlazingOption = None,
+    wall: WallOption = None,
     height_from: str | None = typer.Option(None, help="Property with the height."),
     default_height_m: float | None = typer.Option(
         None,

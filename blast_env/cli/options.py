@@ -28,7 +28,6 @@ ENGINE_HELP: Final = (
     f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
 BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
-CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
 CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
     "for search; fine: later, for final results."
@@ -64,7 +63,9 @@ DrawsOption = Annotated[
     typer.Option("--charges", help="Draws of the charge; each place counts once.", min=1),
 ]
 EngineChoice = Annotated[str, typer.Option("--engine", help=ENGINE_HELP)]
-CellOption = Annotated[float | None, typer.Option("--cell", help=CELL_HELP)]
+CellOption = Annotated[
+    float | None, typer.Option("--cell", help="Side of the cells of gas dynamics, m; else 0.5.")
+]
 CellsOption = Annotated[
     str | None, typer.Option("--cells", help=CELLS_HELP, show_default="uniform")
 ]
@@ -76,6 +77,16 @@ FinalCellOption = Annotated[
 ]
 FinalCellsOption = Annotated[
     str | None, typer.Option("--cells", help=CELLS_HELP, show_default=FINAL_CELLS)
+]
+GlazingOption = Annotated[
+    str | None,
+    typer.Option(
+        "--glazing", help="Windows of protected structures that have no facade, a component."
+    ),
+]
+WallOption = Annotated[
+    str | None,
+    typer.Option("--wall", help="Walls of protected structures that have no facade, a component."),
 ]
 TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
 TargetOption = Annotated[str | None, typer.Option("--target", help=TARGET_HELP.format("low"))]

@@ -11,10 +11,10 @@ import typer
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     BY_SITE,
-    CELL_HELP,
-    CELLS_HELP,
     ENGINE_HELP,
     UNTIL_HELP,
+    CellOption,
+    CellsOption,
     ChargeOption,
     GivenCharge,
     JsonOption,
@@ -82,10 +82,8 @@ def simulate(
     side_by_side: bool = typer.Option(
         False, "--side-by-side", help="Show in all pictures the site without the barrier as well."
     ),
-    cell_m: float | None = typer.Option(None, "--cell", help=CELL_HELP, rich_help_panel=_GAS),
-    cells: str | None = typer.Option(
-        None, help=CELLS_HELP, rich_help_panel=_GAS, show_default="uniform"
-    ),
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
     until: str | None = typer.Option(
         None, help=UNTIL_HELP, rich_help_panel=_GAS, show_default="structures"
     ),

@@ -263,14 +263,6 @@ class LoadCaseSet:
         return objective.objective_value(combined, cost / budget if budget else 0.0)
 
 
-def visible_case(
-    scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
-) -> LoadCaseSet:
-    """Return the case of a known charge, with one realisation of fan and air per seed."""
-    found, threats = find_scenario(scenario), tuple(LoadCase(charge, seed) for seed in seeds)
-    return LoadCaseSet(found, threats, realisations=len(threats), risk=risk, charge=charge)
-
-
 def search_set(
     scenario: AnyScenario,
     charge: AnyCharge | None,

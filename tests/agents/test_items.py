@@ -24,7 +24,7 @@ from blast_env.design.search import (
 from blast_env.design.search.moves import Moves, random_part, random_walls
 from blast_env.design.search.operators import cut, individual, layout_of, mixed, repaired
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.cases import visible_case
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
@@ -230,7 +230,7 @@ def problem() -> DesignProblem:
         items=[item("wall", 3, 1, 2.0, cost=3.0, stock=2), item("post", 1, 1, 1.0, stock=2)],
         budget=7.0,
     ).model_copy(update={"calibration": CALIBRATION})
-    case = visible_case(scenario, CHARGE, [1])
+    case = LoadCaseSet(scenario, (LoadCase(CHARGE, 1),), charge=CHARGE)
     return DesignProblem(BlastEvaluator(scenario, "event"), case)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from blast_env import load_scenario
-from blast_env.cli.draw import suitability
+from blast_env.cli.suitability import suitability
 from blast_env.evaluation import BlastEvaluator
 from blast_env.site import Scenario
 from tests.gas_sites import hut

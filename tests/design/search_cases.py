@@ -9,8 +9,7 @@ import numpy as np
 from blast_env import load_scenario
 from blast_env.design.search import DesignProblem, Layout
 from blast_env.errors import LayoutError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
-from blast_env.evaluation.cases import visible_case
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, LoadCaseSet
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
@@ -41,7 +40,8 @@ def small_problem(
     evaluator = evaluator or BlastEvaluator(small_scenario(), "event")
     charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
     seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
-    case = visible_case(evaluator.scenario, charge, seeds.tolist())
+    threats = tuple(LoadCase(charge, seed) for seed in seeds.tolist())
+    case = LoadCaseSet(evaluator.scenario, threats, realisations, charge=charge)
     return DesignProblem(evaluator, case, processes)
 
 

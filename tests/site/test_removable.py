@@ -12,7 +12,7 @@ from blast_env.design.search import DesignProblem, RandomSearch
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.cases import visible_case
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece, Removal, layout_words, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
@@ -112,7 +112,8 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     assert info["layout"] == (AWAY,)
     assert reward < 0.0
     evaluator = BlastEvaluator(scenario, SHORT)
-    case = visible_case(scenario, scenario.sample_charge(np.random.default_rng(0)), [0])
+    charge = scenario.sample_charge(np.random.default_rng(0))
+    case = LoadCaseSet(scenario, (LoadCase(charge),), charge=charge)
     found = RandomSearch().propose(DesignProblem(evaluator, case), 30, 0)
     assert found.layout
     assert AWAY not in found.layout
