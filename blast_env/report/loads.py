@@ -1,12 +1,12 @@
 """Loads by building and wall, with their durations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from math import nan
+from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
@@ -15,7 +15,6 @@ from blast_env.evaluation.standing import Stood
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
-from blast_env.gas.tables import means_by_wall
 from blast_env.geometry import Rectangle
 from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
@@ -56,9 +55,7 @@ class ReportedBuilding:
     @property
     def bounds_m(self) -> Rectangle:
         """The rectangle around it."""
-        sides = np.array([each.rectangle_m for each in self.structures])
-        low, high = sides.min(axis=0), sides.max(axis=0)
-        return Rectangle(float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+        return Rectangle.around([each.rectangle_m for each in self.structures])
 
 
 def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
@@ -136,7 +133,6 @@ class TargetLoad:
     """The load on a building, over its counted walls.
 
     Attributes:
-        target: Its name.
         impulse_pa_s: Peak specific impulse, mean over the area of the walls.
         peak_pa: Largest overpressure on a face of a cell.
         counted: The peak to compare with limits.
@@ -150,7 +146,6 @@ class TargetLoad:
         stood: Standing of the mean impulse.
     """
 
-    target: str
     impulse_pa_s: float
     peak_pa: float
     counted: CountedPeak
@@ -180,17 +175,12 @@ class MeasuredBlast:
     @cached_property
     def loads(self) -> dict[str, TargetLoad]:
         """The load on every building with a wall in the air, by name."""
-        faces = self.result.on_walls
-        loads = {}
-        for target in self.targets:
-            counting = [
-                (faces["structure"] == each.name) & faces["face"].isin(each.faces)
-                for each in counted_parts(target.structures)
-            ]
-            walls = faces[np.logical_or.reduce(counting)]
-            if len(walls):
-                loads[target.name] = self._load(target, walls)
-        return loads
+        rows = self.result.buildings.set_index("building").to_dict("index")
+        return {
+            each.name: self._load(each, rows[each.name])
+            for each in self.targets
+            if rows[each.name]["most_loaded_face"]
+        }
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -205,45 +195,28 @@ class MeasuredBlast:
         notes += (*self.result.stepped_notes, *self.result.moved_gauges)
         return tuple(dict.fromkeys(notes))
 
-    def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
-        by_wall = means_by_wall(walls, "impulse_pa_s")
-        building = next(
-            each
-            for each in self.result.buildings.to_dict("records")
-            if each["building"] == target.name
-        )
-        wall = next(each for each in WALLS if each == by_wall.idxmax())
-        arrivals = walls["arrival_s"].to_numpy()
-        known = self._is_known(target, wall)
+    def _load(self, target: ReportedBuilding, row: Mapping[str, Any]) -> TargetLoad:
+        """Return the load on a building from its row in the table of buildings."""
+        faces, wall = self.result.on_walls, row["most_loaded_face"]
+        counting = [
+            (faces["structure"] == each.name) & faces["face"].isin(each.faces)
+            for each in counted_parts(target.structures)
+        ]
+        walls = faces[np.logical_or.reduce(counting)]
+        pressure = self.histories.of(target.name, wall)
         in_range = all(self.result.impulse(name).in_range for name in target.names)
         return TargetLoad(
-            target=target.name,
-            impulse_pa_s=float(building["impulse_pa_s"]),
-            peak_pa=float(walls["peak_pa"].max()),
+            impulse_pa_s=row["impulse_pa_s"],
+            peak_pa=row["peak_pa"],
             counted=counted_peak(self.result.run.site, self.result.run.grid.cell_m, walls),
-            arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),
+            arrival_s=row["arrival_s"],
             wall=wall,
-            wall_impulse_pa_s=float(by_wall.max()),
-            duration_s=self._duration_s(target.name, wall),
-            known=known,
-            flagged=not (known and in_range),
+            wall_impulse_pa_s=row["most_loaded_pa_s"],
+            duration_s=nan if pressure is None else first_phase_s(self.histories.time_s, pressure),
+            known=row["known"],
+            flagged=not (row["known"] and in_range),
             stood=self.result.standing(target.names),
         )
-
-    def _is_known(self, target: ReportedBuilding, wall: WallName) -> bool:
-        buildings, walls = self.result.buildings, self.result.walls
-        on_building = buildings.loc[buildings["building"] == target.name, "known"]
-        on_wall = walls["structure"].isin(target.names) & (walls["face"] == wall) & walls["counts"]
-        return bool(on_building.all() and walls.loc[on_wall, "known"].all())
-
-    def _duration_s(self, target: str, wall: WallName) -> float:
-        pressure = self.histories.of(target, wall)
-        if pressure is None:
-            return float("nan")
-        return first_phase_s(self.histories.time_s, pressure)
-
-
-_NO_PHASE: Final = float("nan")
 
 
 def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
@@ -254,20 +227,17 @@ def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
     """
     arrived = np.flatnonzero(overpressure_pa >= ARRIVAL_PA)
     if len(arrived) == 0:
-        return _NO_PHASE
+        return nan
     before = np.flatnonzero(overpressure_pa[: arrived[0]] <= 0.0)
     after = np.flatnonzero(overpressure_pa[arrived[0] :] <= 0.0)
     if len(after) == 0:
-        return _NO_PHASE
+        return nan
     first = before[-1] if len(before) else 0
-    return _zero_s(time_s, overpressure_pa, int(arrived[0] + after[0])) - float(time_s[first])
-
-
-def _zero_s(time_s: FloatArray, pressure_pa: FloatArray, index: int) -> float:
-    """Return the time at which a pressure falls to 0 in the step before an index, s."""
-    high, low = pressure_pa[index - 1], pressure_pa[index]
-    share = high / (high - low)
-    return float(time_s[index - 1] + share * (time_s[index] - time_s[index - 1]))
+    end = int(arrived[0] + after[0])
+    # From the last positive value to the first that is not, in a straight line to 0.
+    high, low = overpressure_pa[end - 1], overpressure_pa[end]
+    end_s = time_s[end - 1] + high / (high - low) * (time_s[end] - time_s[end - 1])
+    return float(end_s - time_s[first])
 
 
 def measure(

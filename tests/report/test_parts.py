@@ -137,7 +137,7 @@ def test_structures_of_a_building_are_one_target() -> None:
 def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
     counted = CountedPeak(peak_pa, PeakSource.CURVE)
     return TargetLoad(
-        "hut", 1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False, UNSTATED
+        1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False, UNSTATED
     )
 
 
