@@ -648,14 +648,19 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
             area_feature(Kinds.REACHED, each, Kinds.REACHED.words) for each in rectangles_of(ground)
         )
         place_m = worst_places(scenario, source, layout).places_m[0]
-        wall_m = nearest_point_m(scenario.structures, place_m)
-        length = f"stand-off {np.hypot(*np.subtract(place_m, wall_m)):.1f} m"
-        found.append(Feature(Kinds.STAND_OFF, (place_m, wall_m), "stand-off", label=length))
+        found.append(stand_off_feature(scenario.structures, place_m))
         said = {"tnt_kg": source.tnt_kg, "above_ground_m": source.height_m}
         words = "worst place of a vehicle"
         found.append(Feature(Kinds.CHARGE, (place_m,), words, said, words))
         found += _way_of_vehicle(*vehicle_drive(scenario, source, layout).weakest_way)
     return in_order(found)
+
+
+def stand_off_feature(structures: Sequence[AnyStructure], place_m: PointM) -> Feature:
+    """Return the line from a place to the nearest wall that counts, with its length in metres."""
+    wall_m = nearest_point_m(structures, place_m)
+    length = f"stand-off {np.hypot(*np.subtract(place_m, wall_m)):.1f} m"
+    return Feature(Kinds.STAND_OFF, (place_m, wall_m), "stand-off", label=length)
 
 
 def _way_of_vehicle(way: Sequence[WayPoint], through: Sequence[Impact]) -> Iterator[Feature]:

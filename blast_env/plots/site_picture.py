@@ -1,4 +1,4 @@
-"""The plan of a site with a layout, without a blast."""
+"""Plans of sites, without a blast."""
 
 from collections.abc import Sequence
 from math import cos, radians, sin
@@ -8,6 +8,7 @@ from blast_env.geometry import Element, layout_words
 from blast_env.layout import LayoutState
 from blast_env.plots.plan import (
     INK,
+    Feature,
     item_colours,
     item_words,
     site_features,
@@ -56,16 +57,35 @@ def site_picture(scenario: AnyScenario, layout: Sequence[Element] = ()) -> Figur
     placement = LayoutState.of(found, layout)
     layout = placement.layout
     features = (*site_features(found, layout), *vehicle_features(found, layout))
-    handles = [*legend_of(features), *_items_left(found.build_zone, placement)]
-    width_in, height_in = _panel_in(found)
-    height_in += _HEADING_IN
+    left = _items_left(found.build_zone, placement)
+    return plan_figure(found, features, left, (found.name, _subtitle(found, placement)))
+
+
+def plan_figure(
+    scenario: Scenario,
+    features: Sequence[Feature],
+    handles: Sequence[Artist] = (),
+    heading: tuple[str, str] | None = None,
+) -> Figure:
+    """Return a plan of a site with its scale, north, legend and names.
+
+    Args:
+        scenario: The scenario.
+        features: The features to draw and to name.
+        handles: Further entries of the legend.
+        heading: Title and subtitle.
+    """
+    width_in, height_in = _panel_in(scenario)
+    height_in += _HEADING_IN if heading else 0.0
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    figure.set_figheight(height_in + write_legend(figure, handles) * _LEGEND_ROW_IN)
+    lines = write_legend(figure, [*legend_of(features), *handles])
+    figure.set_figheight(height_in + lines * _LEGEND_ROW_IN)
     axes = figure.subplots()
     draw_plan(axes, features)
-    draw_scale(axes, found)
-    draw_north(axes, found)
-    write_heading(figure, found.name, _subtitle(found, placement))
+    _draw_scale(axes, scenario)
+    draw_north(axes, scenario)
+    if heading:
+        write_heading(figure, *heading)
     write_names(axes, features)
     return figure
 
@@ -102,7 +122,7 @@ def _subtitle(scenario: Scenario, placement: LayoutState) -> str:
     return ", ".join(filter(None, parts))
 
 
-def draw_scale(axes: Axes, scenario: Scenario) -> None:
+def _draw_scale(axes: Axes, scenario: Scenario) -> None:
     """Draw a scale bar over the lower left corner of the site."""
     length_m = nice_floor(scenario.site.width_m / 3.0)  # a round one
     x_m = y_m = 0.03 * max(scenario.site.width_m, scenario.site.height_m)

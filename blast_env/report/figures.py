@@ -16,27 +16,21 @@ from blast_env.plots.ground_map import threshold_map
 from blast_env.plots.plan import (
     INK,
     QUIET_INK,
-    Feature,
     Kinds,
     charge_feature,
+    in_order,
     site_features,
+    stand_off_feature,
     vehicle_features,
     without,
 )
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
-from blast_env.plots.site_picture import draw_north, draw_scale
-from blast_env.plots.site_plan import (
-    draw_plan,
-    legend_of,
-    rectangle_patch,
-    write_legend,
-    write_names,
-)
+from blast_env.plots.site_picture import plan_figure
+from blast_env.plots.site_plan import draw_plan, rectangle_patch, write_names
 from blast_env.plots.style import render_extra, unit_interval
 from blast_env.report.loads import MeasuredBlast, ReportedBuilding
 from blast_env.report.outcomes import ItemWorth
 from blast_env.site import Scenario
-from blast_env.site.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M, MS_PER_S, PA_PER_KPA
 
 with render_extra():
@@ -69,52 +63,22 @@ def _page(height_in: float) -> tuple[Figure, Axes]:
 
 
 def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -> bytes:
-    """Return the plan of a site with buildings, heights, threats and the layout.
+    """Return the plan of a site with buildings, heights, the layout, and the stand-off of threats.
 
     Vehicles and their charges stand at the places that the layout leaves them.
     """
-    figure, axes = _page(_height_in(scenario) + 0.9)
-    charges = [
-        charge_feature(
-            threat.charge_against(scenario, layout),
-            threat.name,
-            f"{threat.name}: {threat.charge.tnt_kg:g} kg",
-        )
-        for threat in threats
-    ]
-    vehicles = without(vehicle_features(scenario, layout), Kinds.CHARGE)
-    features = (*_unlabelled(site_features(scenario, layout)), *vehicles, *charges)
-    draw_plan(axes, features)
+    features = [*without(vehicle_features(scenario, layout), Kinds.CHARGE, Kinds.STAND_OFF)]
+    for feature in site_features(scenario, layout):
+        if feature.kind is not Kinds.CHARGE_PLACE:
+            features.append(feature)
+        elif len(feature.places_m) > 1:  # the threats have labels of their own
+            features.append(replace(feature, label=""))
     for threat in threats:
-        _draw_stand_off(axes, scenario, threat.charge_against(scenario, layout).position_m)
-    draw_scale(axes, scenario)
-    draw_north(axes, scenario)
-    write_legend(figure, legend_of(features))
-    write_names(axes, features)
-    return png(figure)
-
-
-def _draw_stand_off(axes: Axes, scenario: Scenario, place_m: tuple[float, float]) -> None:
-    """Draw the line from a charge to the nearest protected wall, with its length."""
-    wall_m = nearest_point_m(scenario.structures, place_m)
-    length_m = float(np.hypot(wall_m[0] - place_m[0], wall_m[1] - place_m[1]))
-    ink = unit_interval(INK)
-    axes.annotate("", wall_m, place_m, arrowprops={"arrowstyle": "<|-|>", "color": ink}, zorder=7.0)
-    middle_m = (0.5 * (wall_m[0] + place_m[0]), 0.5 * (wall_m[1] + place_m[1]))
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
-    axes.annotate(f"{length_m:.1f} m", middle_m, ha="center", va="center", bbox=box, zorder=8.0)
-
-
-def _unlabelled(features: Sequence[Feature]) -> list[Feature]:
-    """Return the features of a site without point charges and labels of charges.
-
-    The threats are drawn with labels in their place.
-    """
-    return [
-        replace(each, label="") if each.kind is Kinds.CHARGE_PLACE else each
-        for each in features
-        if each.kind is not Kinds.CHARGE_PLACE or len(each.places_m) > 1
-    ]
+        charge = threat.charge_against(scenario, layout)
+        label = f"{threat.name}: {threat.charge.tnt_kg:g} kg"
+        features.append(charge_feature(charge, threat.name, label))
+        features.append(stand_off_feature(scenario.structures, charge.position_m))
+    return png(plan_figure(scenario, in_order(features)))
 
 
 def _height_in(scenario: Scenario) -> float:

@@ -195,7 +195,7 @@ class MeasuredBlast:
         notes += (*self.result.stepped_notes, *self.result.moved_gauges)
         return tuple(dict.fromkeys(notes))
 
-    def _load(self, target: ReportedBuilding, row: Mapping[str, Any]) -> TargetLoad:
+    def _load(self, target: ReportedBuilding, row: Mapping[Any, Any]) -> TargetLoad:
         """Return the load on a building from its row in the table of buildings."""
         faces, wall = self.result.on_walls, row["most_loaded_face"]
         counting = [
