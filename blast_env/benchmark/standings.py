@@ -1,13 +1,13 @@
 """The standings: tables of the judged submissions, one row per method."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
 
 from blast_env.benchmark.definitions import DEFINITIONS
 from blast_env.benchmark.judging import JudgedSubmission
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.statistics import Estimate
 from blast_env.tables import markdown_table
 from blast_env.values import markup_text
@@ -23,22 +23,7 @@ _NAMED = 3
 """Most problems that a title names."""
 
 
-@dataclass(frozen=True)
-class StandingsTable:
-    """A table of methods on the same problems, judged with the same cells.
-
-    Attributes:
-        title: Problems, quantity and cells.
-        headers: Headers of the columns; the first column has the methods.
-        rows: Rows, best method first.
-    """
-
-    title: str
-    headers: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[StandingsTable]:
+def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[AnswerTable]:
     """Yield a table for each set of problems and size of the judge's cells."""
     groups: dict[tuple[tuple[str, ...], float], list[JudgedSubmission]] = {}
     for each in judged:
@@ -69,7 +54,7 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
 
 def _table(
     judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float
-) -> StandingsTable:
+) -> AnswerTable:
     runs = {run.problem: run for each in judged for run in each.runs}.values()
     rule, best = (
         100.0 * (1.0 - float(np.mean(shares)))
@@ -97,7 +82,7 @@ def _table(
         names = "All problems"
     elif len(problems) > _NAMED:
         names = f"{len(problems)} problems: {', '.join(problems[:_NAMED])}, ..."
-    return StandingsTable(
+    return AnswerTable(
         f"{names}; cells of {cell_m:g} m",
         (
             *("method", "blasts", "seeds", "score", "over seeds", "over problems"),

@@ -38,8 +38,7 @@ from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS, AdviceJudge, Advised, advised, asked_site
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
-from blast_env.evaluation.engines.contract import JUDGE, find_engine
-from blast_env.evaluation.grid_error import final_engine
+from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.layout import write_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection

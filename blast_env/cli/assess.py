@@ -27,6 +27,7 @@ from blast_env.cli.options import (
     wanted_level,
 )
 from blast_env.cli.output import (
+    judged_blasts,
     print_answer,
     print_cost,
     print_line,
@@ -48,8 +49,7 @@ from blast_env.evaluation.consequences import (
     Consequences,
     bay_table,
 )
-from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine
+from blast_env.evaluation.engines import JUDGE, Engine, final_engine
 from blast_env.evaluation.screening import (
     LEFT_OUT,
     STAND_OFF_HEADERS,
@@ -173,8 +173,7 @@ def assess(
             _capacity(evaluator, layouts, drawn)
         return
     print_line(engine.describe([site]))
-    asked = [(engine, each) for each in drawn] + [(engine.coarser, drawn[0])]
-    print_cost((each, site, charge) for each, charge in asked for _ in layouts)
+    print_cost(judged_blasts(engine, site, drawn, len(layouts)))
     with resumable(resume_words(cache)):
         with progress_bar(counted(len(drawn))) as progress:
             assessed = assessed_by(

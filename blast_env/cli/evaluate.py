@@ -1,7 +1,7 @@
 """`blast-env evaluate`: a layout against no barrier."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from math import isnan
 from pathlib import Path
@@ -28,6 +28,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
+    judged_blasts,
     layout_picture,
     print_cost,
     print_json,
@@ -50,8 +51,7 @@ from blast_env.evaluation.answers import (
     worse,
 )
 from blast_env.evaluation.cases import are_all, fixed_charges
-from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine
+from blast_env.evaluation.engines import JUDGE, final_engine
 from blast_env.files import make_folder, write_text
 from blast_env.geometry import layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_to, is_file
@@ -120,7 +120,8 @@ def evaluate(
             make_folder(out)
         if not as_json:
             print_line(used.describe([site]))
-            print_cost(_asked_blasts(case, used))
+            charges = [each.charge for each in case.threats]
+            print_cost(judged_blasts(used, site, charges, layouts=2))
         evaluator = BlastEvaluator(site, used, cache=cache)
         with progress_bar(f"{2 * len(case.threats)} blasts in {site.name}") as progress:
             found = compare(
@@ -146,7 +147,7 @@ def evaluate(
         print_json({key: x for key, x in {**record, **more}.items() if key not in _LEFT_OUT})
         return
     _print_layout(found, drawn)
-    _print_if_all_charges(site, [threat.charge for threat in case.threats])
+    _print_if_all_charges(site, [each.charge for each in case.threats])
     for note in found.notes:
         print_line(f"note: {note}")
     print_written(written)
@@ -187,15 +188,6 @@ _HEADERS: Final = (
     "threats in range",
     "standing",
 )
-
-
-def _asked_blasts(
-    case: LoadCaseSet, engine: Engine
-) -> Iterator[tuple[Engine | None, Scenario, AnyCharge]]:
-    """Yield the blasts of an evaluation, for their cost: both layouts, and the worst threat."""
-    for threat in case.threats:
-        yield from [(engine, case.scenario, threat.charge)] * 2
-    yield from [(engine.coarser, case.scenario, case.threats[0].charge)] * 2
 
 
 def _write(found: Evaluation, record: Mapping[str, Any], out: Path) -> list[Path]:

@@ -202,6 +202,15 @@ def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> 
         print_line(f"up to {cost_words(found)}")
 
 
+def judged_blasts(
+    engine: "Engine", scenario: Scenario, charges: Sequence[AnyCharge], layouts: int
+) -> "Iterator[tuple[Engine | None, Scenario, AnyCharge]]":
+    """Yield the blasts of a judgement, for their cost: one charge has coarser cells as well."""
+    for charge in charges:
+        yield from [(engine, scenario, charge)] * layouts
+    yield from [(engine.coarser, scenario, charges[0])] * layouts
+
+
 def _progress_lines(console: Console, label: str) -> Callable[..., None]:
     """Return a function that writes the completed share, at most every half minute."""
     began = printed_s = perf_counter()

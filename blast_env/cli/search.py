@@ -33,6 +33,7 @@ from blast_env.cli.output import (
     LAYOUT_NAME,
     LAYOUT_PICTURE,
     InterruptedCommandError,
+    judged_blasts,
     layout_picture,
     print_cost,
     print_line,
@@ -69,8 +70,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.answers import load_text, percent, share_text
 from blast_env.evaluation.cases import one_of_each_charge, search_set
-from blast_env.evaluation.engines import JUDGE, find_engine
-from blast_env.evaluation.grid_error import final_engine
+from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import LayoutState, load_layout, write_layout
@@ -467,8 +467,8 @@ def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
     layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
     distinct = list(dict.fromkeys(layouts.values()))
     print_line(engine.describe())
-    asked = [(engine, each) for each in case.threats] + [(engine.coarser, case.threats[0])]
-    print_cost((each, scenario, threat.charge) for each, threat in asked for _ in distinct)
+    drawn = [each.charge for each in case.threats]
+    print_cost(judged_blasts(engine, scenario, drawn, len(distinct)))
     evaluators, found = Evaluators(engine), dict[Layout, Evaluation]()
     with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
         for number, each in enumerate(distinct):

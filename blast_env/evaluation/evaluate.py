@@ -11,9 +11,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct, draw_threats, in_turn
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.engines.contract import BlastLoads
+from blast_env.evaluation.engines.contract import BlastLoads, final_engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.grid_error import final_engine, grid_error
+from blast_env.evaluation.grid_error import grid_error
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout

@@ -14,7 +14,7 @@ The index is absolute: that of a load is a load, that of a reduction a share. It
 error of the model nor the spread of charges.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Final, TypeAlias
@@ -22,10 +22,9 @@ from typing import Final, TypeAlias
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import percent, points, with_errors, worse
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
-from blast_env.evaluation.engines.contract import BlastLoads, Engine, find_engine
+from blast_env.evaluation.engines.contract import BlastLoads, Engine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Layout
-from blast_env.site import Scenario
 from blast_env.statistics import reductions
 
 ORDER: Final = 2.0
@@ -59,21 +58,6 @@ def convergence_index(
         if not value > least:
             raise BlastEnvError(f"{name} is {value:g}, must be above {least:g}")
     return float(factor * abs(fine - coarse) / (ratio**order - 1.0))
-
-
-def final_engine(
-    engine: str | Engine,
-    scenarios: Sequence[Scenario],
-    cell_m: float | None = None,
-    cells: str | None = None,
-) -> Engine:
-    """Return the engine of final statements on some sites, or the one with the given cells.
-
-    An engine in place of a name keeps its cells. Errors are those of `find_engine`.
-    """
-    found = find_engine(engine, cell_m, cells=cells)
-    is_given = isinstance(engine, Engine) or cell_m is not None or cells is not None
-    return found if is_given else found.final(scenarios)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

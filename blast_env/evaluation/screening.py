@@ -512,25 +512,16 @@ def _tabulated(
     parts: Sequence[Pane | Panel], peak_pa: FloatArray, impulse_pa_s: FloatArray
 ) -> FloatArray:
     """Return the damage of the worst of some parts under many loads, by a table of it."""
-    shares, axes = [], []
-    for values in (peak_pa, impulse_pa_s):
-        low, high = np.log(values.min()), np.log(values.max()) + 1e-6
-        axes.append(np.exp(np.linspace(low, high, _POINTS)))
-        shares.append((np.log(values) - low) / (high - low) * (_POINTS - 1))
-    table = np.array(
+    from scipy.interpolate import RegularGridInterpolator  # takes a while to import
+
+    logarithms = np.log(peak_pa), np.log(impulse_pa_s)
+    axes = [np.linspace(each.min(), each.max() + 1e-6, _POINTS) for each in logarithms]
+    peaks, impulses = (np.exp(each).tolist() for each in axes)
+    table = [
         [
-            [
-                max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
-                for impulse in axes[1].tolist()
-            ]
-            for peak in axes[0].tolist()
+            max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
+            for impulse in impulses
         ]
-    )
-    (row, column), (up, right) = (
-        [each.astype(np.int64) for each in shares],
-        [each % 1.0 for each in shares],
-    )
-    left = table[row, column] * (1.0 - up) + table[row + 1, column] * up
-    beside = table[row, column + 1] * (1.0 - up) + table[row + 1, column + 1] * up
-    found: FloatArray = left * (1.0 - right) + beside * right
-    return found
+        for peak in peaks
+    ]
+    return np.asarray(RegularGridInterpolator(axes, table)(logarithms))

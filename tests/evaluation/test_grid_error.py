@@ -10,9 +10,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, evaluate_layout
 from blast_env.evaluation.answers import points, with_errors, worse
 from blast_env.evaluation.cases import LoadCaseSet, draw_threats
-from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.engines import final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.grid_error import convergence_index, final_engine
+from blast_env.evaluation.grid_error import convergence_index
 from blast_env.site import load_scenario
 from blast_env.statistics import reductions
 from tests.gas_sites import WALL, hut, site_document

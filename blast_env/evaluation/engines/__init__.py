@@ -11,6 +11,7 @@ from blast_env.evaluation.engines.contract import (
     Engine,
     StructureLoad,
     default_engine,
+    final_engine,
     find_engine,
 )
 from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
@@ -27,6 +28,7 @@ __all__ = [
     "ParticleEngine",
     "StructureLoad",
     "default_engine",
+    "final_engine",
     "find_engine",
     "simulate",
 ]

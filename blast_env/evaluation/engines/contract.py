@@ -511,6 +511,21 @@ def find_engine(engine: str | Engine, cell_m: float | None = None, **settings: A
     return found.configured(cell_m=cell_m, **settings)
 
 
+def final_engine(
+    engine: str | Engine,
+    scenarios: Sequence[Scenario],
+    cell_m: float | None = None,
+    cells: str | None = None,
+) -> Engine:
+    """Return the engine of final statements on some sites, or the one with the given cells.
+
+    An engine in place of a name keeps its cells. Errors are those of `find_engine`.
+    """
+    found = find_engine(engine, cell_m, cells=cells)
+    is_given = isinstance(engine, Engine) or cell_m is not None or cells is not None
+    return found if is_given else found.final(scenarios)
+
+
 def _made(name: str) -> Engine:
     if name in _PLACES:
         own: Engine = load_plugin(_PLACES[name])()
