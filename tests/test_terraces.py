@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.app.solids import boxes
 from blast_env.design.surrogate import packaged_surrogate, site_of
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult

@@ -27,7 +27,8 @@ from blast_env.envs.episode import (
     find_threat_model,
     total,
 )
-from blast_env.envs.observations import MASK, OBSERVATIONS, Observable, Observation
+from blast_env.envs.observable import MASK, Observable, Observation
+from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import (
     REWARDS,
     Reward,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.episode import Episode
-from blast_env.envs.observations import VehicleView
+from blast_env.envs.observable import VehicleView
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle

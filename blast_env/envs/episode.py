@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import ResetOptions, strategy
-from blast_env.envs.observations import (
+from blast_env.envs.observable import (
     MASK,
     BatchedObservation,
     EpisodeObservation,

@@ -15,7 +15,7 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.envs.arguments import PlainSpec, ResetOptions, check_names
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.episode import Episode, total
-from blast_env.envs.observations import MASK, BatchedObservation, one_of
+from blast_env.envs.observable import MASK, BatchedObservation, one_of
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.evaluator import run_together
 from blast_env.evaluation.store import BlastStore

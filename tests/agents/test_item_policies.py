@@ -10,7 +10,7 @@ from blast_agents.training import load_agent, train
 from blast_agents.training.agent import logits_of
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.site import save_scenario

@@ -20,7 +20,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import OBSERVATIONS, GridObservation
+from blast_env.envs.observations import OBSERVATIONS
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario

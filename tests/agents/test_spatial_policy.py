@@ -19,7 +19,8 @@ from blast_agents.training.agent import logits_of
 import blast_env  # noqa: F401
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import GridObservation, Observable
+from blast_env.envs.observable import Observable
+from blast_env.envs.planes import GridObservation
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.sites import Visibility, generate_site

@@ -17,7 +17,8 @@ from stable_baselines3.common.save_util import save_to_zip_file
 
 from blast_env import load_scenario
 from blast_env.design.search import LayoutAgent
-from blast_env.envs.observations import GridObservation, Observable
+from blast_env.envs.observable import Observable
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.layout import LayoutState
 from blast_env.site import PointSource, Scenario

@@ -8,7 +8,7 @@ import pytest
 
 from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState, check_layout

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from blast_env.envs.observations import Observable
+from blast_env.envs.observable import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastStore, evaluate_layout

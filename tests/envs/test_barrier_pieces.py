@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import (
-    EMPTY_REACH,
-    REACH,
-    FeaturesObservation,
-    GridObservation,
-    Observable,
-)
+from blast_env.envs.observable import Observable
+from blast_env.envs.observations import FeaturesObservation
+from blast_env.envs.planes import EMPTY_REACH, REACH, GridObservation
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece

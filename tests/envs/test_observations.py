@@ -10,12 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import (
-    FeaturesObservation,
-    GridObservation,
-    ImageObservation,
-    SiteGrid,
-)
+from blast_env.envs.observations import FeaturesObservation
+from blast_env.envs.planes import GridObservation, ImageObservation, SiteGrid
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.site import AnySource, PointSource, RectangleSource, Scenario, SegmentSource, Site

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario, save_scenario
 from blast_env.calibration import load_calibration
-from blast_env.envs.observations import FeaturesObservation, GridObservation
+from blast_env.envs.observations import FeaturesObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState

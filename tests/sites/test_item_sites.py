@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats

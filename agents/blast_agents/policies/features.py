@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 
 _LEAST_WAY: Final = 1e-3
 """Least length of a path along an axis, in squares, against division by 0."""

@@ -17,7 +17,7 @@ from blast_agents.policies.features import (
     Planes,
     ZoneGeometry,
 )
-from blast_env.envs.observations import GridObservation
+from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError
 
 _LOGIT_GAIN: Final = 0.01

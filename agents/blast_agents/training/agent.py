@@ -27,15 +27,9 @@ from blast_agents.training.hyperparameters import schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_agents.training.weights import load_policy, read_parameters
 from blast_env.envs.arguments import check_names
-from blast_env.envs.observations import (
-    OBSERVATIONS,
-    SINGLE_ARRAYS,
-    Array,
-    EpisodeObservation,
-    Observable,
-    item_channels,
-    vehicle_channels,
-)
+from blast_env.envs.observable import Array, EpisodeObservation, Observable
+from blast_env.envs.observations import OBSERVATIONS, SINGLE_ARRAYS
+from blast_env.envs.planes import item_channels, vehicle_channels
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
-from blast_env.envs.observations import Array
+from blast_env.envs.observable import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError

@@ -22,7 +22,8 @@ from blast_agents.training.environments import training_store
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration
 from blast_env.design.search import layouts_by_rule
-from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
+from blast_env.envs.observable import EpisodeObservation, Observable
+from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators, LoadCaseSet
 from blast_env.evaluation.evaluator import run_together

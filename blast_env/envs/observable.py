@@ -1,0 +1,233 @@
+"""The observable part of an episode, and the parts common to all observations."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any, Final, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Layout
+from blast_env.layout import LayoutState
+from blast_env.layout.build_site import vehicle_reach, worst_places
+from blast_env.site import (
+    AnySource,
+    BuildZone,
+    Scenario,
+    VehicleSource,
+)
+from blast_env.site.reach import squares_of
+
+Array = NDArray[Any]
+"""An observation; its data type is that of the space."""
+
+MASK: Final = "action_mask"
+"""Key of the mask of legal actions, which environments add to a `Dict`."""
+
+Plane = NDArray[np.float32]
+"""Values of the squares of a site (rows, columns), or several planes of them."""
+
+FULL_CHARGE_KG: Final = 1000.0
+"""TNT-equivalent mass shown as 1; larger ones too."""
+
+FULL_STOCK: Final = 100
+"""Number of modules in stock shown as 1; larger ones too."""
+
+FULL_HEIGHT_M: Final = 12.0
+"""Height shown as 1; larger ones, and the full height of the air, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observable:
+    """The observable part of an episode before the charge goes off.
+
+    Observations use only this and the present layout, so no other information can leak into them:
+    with a hidden threat, `sources` are those of the scenario.
+
+    Attributes:
+        scenario: The scenario.
+        sources: The place of the charge, or its possible places.
+        among_vehicles: Whether other scenarios of the environment have vehicles, so that values
+            for vehicles are present.
+    """
+
+    scenario: Scenario
+    sources: tuple[AnySource, ...]
+    among_vehicles: bool = False
+
+    @property
+    def shows_vehicles(self) -> bool:
+        """Whether observations have values for vehicles."""
+        return self.among_vehicles or bool(self.scenario.vehicles)
+
+
+@dataclass(frozen=True)
+class VehicleView:
+    """The observable vehicles.
+
+    Attributes:
+        scenario: The scenario.
+        vehicles: The vehicles that may bring the charge.
+    """
+
+    scenario: Scenario
+    vehicles: tuple[VehicleSource, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, sources: tuple[AnySource, ...]) -> "VehicleView":
+        """Return the vehicles among the sources of a charge."""
+        return cls(scenario, tuple(each for each in sources if isinstance(each, VehicleSource)))
+
+    def reached(self, layout: Layout) -> BoolArray:
+        """Return the mask of squares of the site within reach of a vehicle, (rows, columns)."""
+        rows, columns = squares_of(self.scenario.site)
+        ground = np.zeros((rows, columns), dtype=bool)
+        for source in self.vehicles:
+            ground |= vehicle_reach(self.scenario, source, layout).ground(rows, columns)
+        return ground
+
+    def stand_off_m(self, layout: Layout) -> float:
+        """Return the least stand-off of a vehicle, m; infinite without vehicles."""
+        places = (worst_places(self.scenario, source, layout) for source in self.vehicles)
+        return min((each.stand_off_m for each in places), default=inf)
+
+
+class EpisodeObservation(Protocol):
+    """Observes one episode."""
+
+    def observe(self, placement: LayoutState) -> Any:
+        """Return a new element of the space, for the modules placed so far."""
+
+
+class BatchedObservation(ABC):
+    """Observes one episode, or several of them in one array; keeps no state between placements."""
+
+    @staticmethod
+    @abstractmethod
+    def observe_many(episodes: Sequence[Any], placements: Sequence[LayoutState]) -> Any:
+        """Return the observations of episodes of this class, with a leading axis (episodes, ...).
+
+        Args:
+            episodes: The episodes, whose spaces are equal.
+            placements: The modules placed so far in each of them.
+        """
+
+    def observe(self, placement: LayoutState) -> Any:
+        """Return a new element of the space, for the modules placed so far."""
+        return one_of(self.observe_many([self], [placement]), 0)
+
+
+def one_of(observed: Any, index: int) -> Any:
+    """Return one of several observations."""
+    if isinstance(observed, dict):
+        return {key: each[index] for key, each in observed.items()}
+    return observed[index]
+
+
+class Observation(Protocol):
+    """A kind of observation."""
+
+    def space(self, scenario: Scenario) -> spaces.Space[Any]:
+        """Return the space, a `Box`, or a `Dict` without the key `action_mask`.
+
+        The environment adds this mask to a `Dict`. The space depends only on the sizes of site and
+        build zone, the names and sizes of the items, and whether there are vehicles.
+        """
+
+    def episode(self, observable: Observable) -> EpisodeObservation:
+        """Prepare the observations of an episode, with all values that do not change."""
+
+
+# ---- Values from 0 to 1, common to planes and vectors.
+
+
+def charge_share(tnt_kg: float) -> float:
+    """Return a charge's mass as an observed value: (mass / 1000 kg)^(1/3), at most 1.
+
+    The cube root, because distances scale with it (Hopkinson and Cranz): a charge of eight times
+    the mass has the same peak at twice the distance.
+    """
+    return float(min((tnt_kg / FULL_CHARGE_KG) ** (1.0 / 3.0), 1.0))
+
+
+def height_share(height_m: float | None) -> float:
+    """Return a height as an observed value: a share of 12 m, at most 1; 1 for None."""
+    return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
+
+
+def stock_shares(placements: Sequence[LayoutState]) -> FloatArray:
+    """Return the remaining stock and budget as values from 0 to 1 (placements, 3).
+
+    They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
+    and the share of the budget (1 without a budget).
+    """
+    rows = []
+    for each in placements:
+        zone, left, budget_left = each.scenario.zone, each.stock_left, each.budget_left
+        of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
+        rows.append((left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget))
+    return np.array(rows)
+
+
+def cost_shares(scenario: Scenario) -> FloatArray:
+    """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
+    costs = LayoutState.empty(scenario).module_costs
+    return np.asarray(costs / costs.max())
+
+
+def cells_shown(placements: Sequence[LayoutState], legal: BoolArray) -> BoolArray:
+    """Return where modules stand and where some may be placed (placements, 2, rows, columns).
+
+    Args:
+        placements: The placements.
+        legal: `LayoutState.legal` of each (placements, variants, rows, columns).
+    """
+    occupied = np.array([each.standing for each in placements]) > 0
+    return np.stack((occupied, legal.any(axis=1)), axis=1)
+
+
+def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
+    """Return the constant values of the items of a catalogue, including measures.
+
+    Returns:
+        Their heights (items,), and their costs per piece (items,): as a share of the budget, or of
+        the dearest item's cost if there is no budget, at most 1.
+    """
+    everything = {each.item: each for each in zone.catalogue.variants}.values()
+    costs = np.array([each.cost for each in everything])
+    shares = np.minimum(costs / (zone.budget or costs.max(initial=1.0)), 1.0)
+    return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
+
+
+def items_placed(placements: Sequence[LayoutState], legal: BoolArray) -> tuple[FloatArray, Plane]:
+    """Return the values of a catalogue that change with the layouts.
+
+    Args:
+        placements: The placements.
+        legal: As for `cells_shown`.
+
+    Returns:
+        The remaining share of the pieces of each item (placements, items); and for each cell the
+        height of its module, whether that stops vehicles, and whether a piece of each variant may
+        have its lower left cell there (placements, 2 + variants, rows, columns).
+    """
+    on_cells = np.empty((len(legal), 2 + legal.shape[1], *legal.shape[2:]), dtype=np.float32)
+    on_cells[:, 2:] = legal
+    tables: dict[int, Plane] = {}
+    for own, each in zip(on_cells, placements, strict=True):
+        if id(each.catalogue) not in tables:
+            rows = [(height_share(v.height_m), v.stops_vehicles) for v in each.catalogue.variants]
+            tables[id(each.catalogue)] = np.array([(0.0, 0.0), *rows], dtype=np.float32).T
+        np.take(tables[id(each.catalogue)], each.standing, axis=1, out=own[:2], mode="clip")
+    return items_left(placements), on_cells
+
+
+def items_left(placements: Sequence[LayoutState]) -> FloatArray:
+    """Return the remaining share of the pieces of each item (placements, items)."""
+    stocks = np.array([each.catalogue.stocks for each in placements])
+    left: FloatArray = np.array([each.stocks_left for each in placements]) / np.maximum(stocks, 1)
+    return left
