@@ -20,7 +20,8 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.presets import CHARGE_PRESETS
-from blast_env.site.sections import PointM, SegmentSource
+from blast_env.site.sections import PointM
+from blast_env.site.sources import SegmentSource
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M

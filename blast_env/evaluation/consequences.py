@@ -57,7 +57,7 @@ from blast_env.response.walls import DamageLevel
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.blast_site import WALLS, BlastSite, Charge
 from blast_env.site.facade import with_glass
-from blast_env.site.sections import buildings_of
+from blast_env.site.structures import buildings_of
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # a third of a second to import

@@ -16,7 +16,7 @@ from blast_env.site import (
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
 from blast_env.site.reach import Reach
-from blast_env.site.sections import AnyStructure, ConcreteSquareSection
+from blast_env.site.structures import AnyStructure, ConcreteSquareSection
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.vehicles import NOTHING, Drive, Obstacles, obstacles_of
 from blast_env.site.worst_places import WorstPlaces

@@ -26,7 +26,7 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import barrier_text, nice_ceiling, render_extra, unit_interval
 from blast_env.response.sdof import impulses
 from blast_env.site.blast_site import WALLS, StructureOutline, WallName
-from blast_env.site.sections import buildings_of
+from blast_env.site.structures import buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():

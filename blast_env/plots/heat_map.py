@@ -39,7 +39,7 @@ from blast_env.plots.style import (
     short_number,
     unit_interval,
 )
-from blast_env.site.sections import buildings_of
+from blast_env.site.structures import buildings_of
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():

@@ -33,7 +33,8 @@ from blast_env.site import (
 from blast_env.site.blast_site import Charge
 from blast_env.site.driving import WayPoint
 from blast_env.site.reach import squares_of
-from blast_env.site.sections import PointM, buildings_of
+from blast_env.site.sections import PointM
+from blast_env.site.structures import buildings_of
 from blast_env.site.terraces import ground_below_m, is_open_below, levels_of
 from blast_env.site.vehicles import Impact
 from blast_env.site.worst_places import nearest_point_m

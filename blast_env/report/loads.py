@@ -19,7 +19,7 @@ from blast_env.geometry import Rectangle
 from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.blast_site import WALLS, BlastSite, WallName
-from blast_env.site.sections import buildings_of
+from blast_env.site.structures import buildings_of
 from blast_env.statistics import counted_parts
 
 

@@ -18,19 +18,15 @@ from blast_env.site.files import (
 from blast_env.site.models import Scenario
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.sections import (
+from blast_env.site.sections import GaugeSection, SimulationSection, Site
+from blast_env.site.sources import (
     AnySource,
-    AnyStructure,
-    ConcreteSquareSection,
-    GaugeSection,
-    ModularObstacleSection,
     PointSource,
     RectangleSource,
     SegmentSource,
-    SimulationSection,
-    Site,
     VehicleSource,
 )
+from blast_env.site.structures import AnyStructure, ConcreteSquareSection, ModularObstacleSection
 from blast_env.site.vehicles import AnyCharge, VehicleCharge
 from blast_env.site.zone import BuildZone, CostArea, KeepOut
 

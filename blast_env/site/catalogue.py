@@ -22,15 +22,8 @@ from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.problems import Problem, ScenarioError, unknown_name
-from blast_env.site.sections import (
-    FOR_PEOPLE,
-    Count,
-    FacadePart,
-    Height,
-    Name,
-    Section,
-    SparseSection,
-)
+from blast_env.site.sections import FOR_PEOPLE, Count, Height, Name, Section, SparseSection
+from blast_env.site.structures import FacadePart
 from blast_env.units import MODULE_SIDE_M
 
 Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]

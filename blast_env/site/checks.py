@@ -19,16 +19,9 @@ from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or
 from blast_env.site.parameters import AirParameters, for_charge
 from blast_env.site.problems import Problem, extent, unknown_name
 from blast_env.site.reach import places_on
-from blast_env.site.sections import (
-    MOST_MODULES,
-    AnyStructure,
-    GaugeSection,
-    Ground,
-    PlaceSource,
-    PointM,
-    Site,
-    VehicleSource,
-)
+from blast_env.site.sections import MOST_MODULES, GaugeSection, Ground, PointM, Site
+from blast_env.site.sources import PlaceSource, VehicleSource
+from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import terrace_problems
 from blast_env.site.vehicles import MOST_PLACES, Obstacles, VehicleGround
 from blast_env.site.zone import (

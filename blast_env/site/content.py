@@ -13,15 +13,14 @@ from blast_env.site.parameters import SimulationParameters
 from blast_env.site.sections import (
     FOR_PEOPLE,
     AnyGeoreference,
-    AnySource,
-    AnyStructure,
     GaugeSection,
     Name,
     Section,
     SimulationSection,
     Site,
-    VehicleSource,
 )
+from blast_env.site.sources import AnySource, VehicleSource
+from blast_env.site.structures import AnyStructure
 from blast_env.site.vehicles import RatedPiece, VehicleGround
 from blast_env.site.zone import BuildZone, Surroundings
 

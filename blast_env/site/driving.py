@@ -35,7 +35,8 @@ from blast_env.site.driving_steps import (
     arcs_up_to,
     wide_places,
 )
-from blast_env.site.sections import Motion, PointM
+from blast_env.site.sections import PointM
+from blast_env.site.sources import Motion
 
 GRAVITY_M_S2: Final = 9.81
 

@@ -29,7 +29,7 @@ from blast_env.response.damage import Alternatives
 from blast_env.response.facade import Bay, FilledBay, bays_in, divide
 from blast_env.site.catalogue import Hardening
 from blast_env.site.problems import Problem, unknown_name
-from blast_env.site.sections import AnyStructure, FacadeSection
+from blast_env.site.structures import AnyStructure, FacadeSection
 
 MOST_BAYS: Final = 5_000
 """Most bays of a scenario: a block of 20 storeys and 750 m of walls."""

@@ -8,7 +8,9 @@ import numpy as np
 
 from blast_env.site.access_way import any_in_windows, counts_before
 from blast_env.site.blast_site import WALLS
-from blast_env.site.sections import AnySource, AnyStructure, GaugeSection
+from blast_env.site.sections import GaugeSection
+from blast_env.site.sources import AnySource
+from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_m
 from blast_env.site.zone import BuildZone, Surroundings, usable_cells
 

@@ -30,12 +30,8 @@ from blast_env.site.content import Content, Sources
 from blast_env.site.facade import NamedBay, named_bays
 from blast_env.site.heights import default_air_height_m, height_notes
 from blast_env.site.problems import Problem, ScenarioError, problems_from
-from blast_env.site.sections import (
-    AnySource,
-    PointSource,
-    PolygonSection,
-    VehicleSource,
-)
+from blast_env.site.sources import AnySource, PointSource, VehicleSource
+from blast_env.site.structures import PolygonSection
 from blast_env.site.vehicles import AnyCharge, VehicleCharge, ranked
 from blast_env.site.zone import (
     BuildZone,

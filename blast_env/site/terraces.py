@@ -8,7 +8,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.site.boxes import TOLERANCE_M, Boxes, covered_m2, overlapping
 from blast_env.site.problems import Problem
-from blast_env.site.sections import AnyStructure
+from blast_env.site.structures import AnyStructure
 
 
 def terrace_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:

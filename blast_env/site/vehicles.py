@@ -28,15 +28,9 @@ from blast_env.site.catalogue import element_text
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
 from blast_env.site.reach import Reach, ReachQuery, steps_of
-from blast_env.site.sections import (
-    AnySource,
-    AnyStructure,
-    Entry,
-    PointM,
-    PointSource,
-    Site,
-    VehicleSource,
-)
+from blast_env.site.sections import PointM, Site
+from blast_env.site.sources import AnySource, Entry, PointSource, VehicleSource
+from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.worst_places import WorstPlaces, least_distances_m, worst_of
 from blast_env.site.zone import BuildZone

@@ -14,7 +14,9 @@ from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle, WallLine
 from blast_env.site.blast_site import Charge, WallName
 from blast_env.site.boxes import box_distances_m
-from blast_env.site.sections import AnyStructure, PointM, VehicleSource
+from blast_env.site.sections import PointM
+from blast_env.site.sources import VehicleSource
+from blast_env.site.structures import AnyStructure
 
 _EQUAL_M: Final = 1e-6
 """Tolerance within which distances are equal."""

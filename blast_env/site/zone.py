@@ -39,19 +39,16 @@ from blast_env.site.catalogue import (
 )
 from blast_env.site.sections import (
     FOR_PEOPLE,
-    AnySource,
-    AnyStructure,
     Area,
     Count,
     Height,
     PointM,
-    PointSource,
-    RectangleSource,
     Section,
     Site,
     SparseSection,
-    VehicleSource,
 )
+from blast_env.site.sources import AnySource, PointSource, RectangleSource, VehicleSource
+from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_m, lie_wholly_on
 from blast_env.units import MODULE_SIDE_M
 

@@ -15,7 +15,8 @@ from blast_env.layout.build_site import vehicle_drive, worst_places
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.driving import KM_H_PER_M_S, STEP_M, SpeedField
-from blast_env.site.sections import Site, VehicleSource
+from blast_env.site.sections import Site
+from blast_env.site.sources import VehicleSource
 from blast_env.site.vehicles import Obstacles, RatedPiece, VehicleGround
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 

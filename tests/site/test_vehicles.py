@@ -16,7 +16,8 @@ from blast_env.layout.build_site import charge_against, vehicle_reach, worst_pla
 from blast_env.site import AnyCharge, VehicleCharge
 from blast_env.site.blast_site import Charge
 from blast_env.site.reach import Reach
-from blast_env.site.sections import Entry, Site, VehicleSource
+from blast_env.site.sections import Site
+from blast_env.site.sources import Entry, VehicleSource
 from blast_env.site.vehicles import Obstacles, VehicleGround, ranked
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 

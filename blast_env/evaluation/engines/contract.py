@@ -37,7 +37,7 @@ from blast_env.site import (
     find_scenario,
 )
 from blast_env.site.facade import NamedBay
-from blast_env.site.sections import StructureSection
+from blast_env.site.structures import StructureSection
 from blast_env.statistics import counted_parts, mean_over_area
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import

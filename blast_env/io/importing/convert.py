@@ -30,7 +30,7 @@ from blast_env.reading import read_apart
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario, SimulationSection
 from blast_env.site.content import MOST_NOTE, MOST_NOTES, SCHEMA_VERSION
-from blast_env.site.sections import SegmentSource
+from blast_env.site.sources import SegmentSource
 from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):

@@ -17,7 +17,8 @@ from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.things import Role
 from blast_env.layout import usable_cells
 from blast_env.site import AnySource, RectangleSource, Scenario, load_scenario, save_scenario
-from blast_env.site.sections import DrawingGeoreference, MapGeoreference, PointM, PolygonSection
+from blast_env.site.sections import DrawingGeoreference, MapGeoreference, PointM
+from blast_env.site.structures import PolygonSection
 from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))

@@ -1,0 +1,342 @@
+"""The structures of a scenario, and their facades."""
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    model_validator,
+)
+
+from blast_env.geometry import Cell, Rectangle
+from blast_env.response.components import PaneSide
+from blast_env.response.facade import BAY_M, STOREY_M, Bay
+from blast_env.site.blast_site import WALLS, WallName
+from blast_env.site.problems import (
+    Problem,
+    ScenarioError,
+)
+from blast_env.site.sections import (
+    FOR_PEOPLE,
+    MOST_MODULES,
+    Coordinate,
+    Count,
+    Height,
+    Name,
+    PointM,
+    Section,
+)
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # shapely takes a tenth of a second to import
+    from blast_env.site.footprint import Footprint
+
+
+def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
+    """Refuse a repeated wall, and return the walls in the order of `WALLS`."""
+    for wall in WALLS:
+        if faces.count(wall) > 1:
+            raise ValueError(f"must name each wall at most once, not {wall!r} twice")
+    return tuple(wall for wall in WALLS if wall in faces)
+
+
+Walls = Annotated[tuple[WallName, ...], Field(min_length=1, max_length=4)]
+
+Storeys = Annotated[
+    tuple[Annotated[StrictInt, Field(ge=1, le=200)], ...], Field(min_length=1, max_length=200)
+]
+
+
+class FacadePart(Section):
+    """Bays with other components than the rest of the facade.
+
+    Attributes:
+        walls: Their walls; all unless given.
+        storeys: Their storeys, from 1; all unless given.
+        glazing: Name of the component of their windows; that of the facade unless given.
+        wall: Name of the component of their wall panels; that of the facade unless given.
+    """
+
+    walls: Walls = WALLS
+    storeys: Storeys | None = None
+    glazing: Name | None = None
+    wall: Name | None = None
+
+    def covers(self, bay: Bay) -> bool:
+        """Return whether a bay belongs to them."""
+        return bay.wall in self.walls and (self.storeys is None or bay.storey in self.storeys)
+
+
+class FacadeSection(Section):
+    """The components of a structure's walls.
+
+    Attributes:
+        storey_m: Height of a storey; the ground floor has the remaining height of the building.
+        storeys: Number of storeys of equal height, in the place of `storey_m`.
+        bay_m: Width of a bay; bays of a wall are made equally wide.
+        glazing: Name of the component of its windows; none unless given.
+        pane_width_m: Width of their panes; by default that of the component.
+        pane_height_m: Height of their panes; by default that of the component.
+        wall: Name of the component of its walls; none unless given.
+        parts: Bays with other components; the last one that covers a bay counts.
+    """
+
+    storey_m: Annotated[StrictFloat, Field(ge=2.0, le=20.0)] = STOREY_M
+    storeys: Annotated[StrictInt, Field(ge=1, le=200)] | None = None
+    bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
+    glazing: Name | None = None
+    pane_width_m: PaneSide | None = None
+    pane_height_m: PaneSide | None = None
+    wall: Name | None = None
+    parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
+
+    def of_side(self, side: WallName) -> FacadePart:
+        """Return the part that is all bays of a side; an empty one if there is none."""
+        own = (each for each in self.parts if each.walls == (side,) and each.storeys is None)
+        return next(own, FacadePart(walls=(side,)))
+
+    def with_side(self, side: WallName, **names: str | None) -> Self:
+        """Return the facade with other components in all bays of a side.
+
+        Args:
+            side: The side.
+            names: Names of components by `glazing` or `wall`; `None`: that of the facade.
+        """
+        before = self.of_side(side)
+        own = before.model_copy(update=names)
+        parts = [each for each in self.parts if each != before]
+        parts += [own] if own.glazing or own.wall else []
+        return self.model_copy(update={"parts": tuple(parts)})
+
+    def names(self) -> Iterator[tuple[str, str]]:
+        """Yield the key and the name of each component."""
+        for key in ("glazing", "wall"):
+            if (name := getattr(self, key)) is not None:
+                yield key, name
+            for index, part in enumerate(self.parts):
+                if (name := getattr(part, key)) is not None:
+                    yield f"parts[{index}].{key}", name
+
+
+PASSAGE_M: Final = 2.0
+"""Least height of a structure's underside at which vehicles pass below."""
+
+
+class StructureSection(Section):
+    """Base of the structures.
+
+    Attributes:
+        name: Name in tables and pictures; `barrier` is taken by the modules of a layout.
+        protected: Whether the load on it counts.
+        weight: Weight of its load among the protected structures.
+        peak_weight: Weight of its peak overpressure, if the objective counts peaks; `weight` unless
+            given.
+        module_capacity: Impulse, simulation units, at which a module is removed; modules never fail
+            unless given.
+        height_m: Height of its top above the ground; the height of the air unless given.
+        base_m: Height of its underside: above 0 it is a canopy, or a storey over a passage. For gas
+            dynamics only.
+        carries: Whether it is a terrace: solid from the ground, and barriers may stand on its top.
+            For gas dynamics only.
+        faces: The walls whose load counts; a wall is named by the side that it faces.
+        building: Name of its building, if that has several structures, for tables; no result
+            depends on it.
+        title: Its name for readers, as on the map, for pictures and tables; no result depends on
+            it.
+        facade: The components of its walls; no load depends on it.
+    """
+
+    name: Name
+    protected: StrictBool = False
+    weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
+    peak_weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None = None
+    module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
+    height_m: Height | None = None
+    base_m: Coordinate = 0.0
+    carries: StrictBool = False
+    faces: Annotated[
+        tuple[WallName, ...],
+        Field(min_length=1, max_length=len(WALLS)),
+        AfterValidator(_check_faces),
+    ] = WALLS
+    building: Name | None = None
+    title: Annotated[str, Field(max_length=100), FOR_PEOPLE] = ""
+    facade: FacadeSection | None = None
+
+    @property
+    def lets_through(self) -> bool:
+        """Whether people and vehicles pass below it: its base is at least `PASSAGE_M` high."""
+        return self.base_m >= PASSAGE_M
+
+    @property
+    def building_name(self) -> str:
+        """Name of its building; the name of the structure if it has none."""
+        return self.building or self.name
+
+    @property
+    def counted_peak_weight(self) -> float:
+        """Weight of its peak: `peak_weight`, or `weight` unless given."""
+        return self.weight if self.peak_weight is None else self.peak_weight
+
+    @property
+    def footprint(self) -> "Footprint | None":
+        """Its polygon; `None` for a rectangle of modules."""
+        return None
+
+    @property
+    def cells(self) -> tuple[Cell, ...] | None:
+        """Rows and columns of its modules, row by row; `None` for all of its grid."""
+        return None
+
+
+class ModularObstacleSection(StructureSection):
+    """A `ModularObstacle`: a rectangle of rows x columns modules."""
+
+    kind: Literal["ModularObstacle"]
+    corner_m: PointM
+    rows: Count
+    columns: Count
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return self.rows * self.columns
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """The footprint, as for every structure in rectangles of modules."""
+        return (self.rectangle_m,)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The footprint."""
+        size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
+        return Rectangle.from_corner(self.corner_m, size)
+
+
+class ConcreteSquareSection(StructureSection):
+    """A `ConcreteSquare`: a square of modules."""
+
+    kind: Literal["ConcreteSquare"]
+    corner_m: PointM
+    side_modules: Count
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return self.rows * self.columns
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """The footprint, as for every structure in rectangles of modules."""
+        return (self.rectangle_m,)
+
+    @property
+    def rows(self) -> int:
+        """Rows of modules."""
+        return self.side_modules
+
+    @property
+    def columns(self) -> int:
+        """Columns of modules."""
+        return self.side_modules
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The footprint."""
+        side = self.side_modules * MODULE_SIDE_M
+        return Rectangle.from_corner(self.corner_m, (side, side))
+
+
+Corners = Annotated[tuple[PointM, ...], Field(min_length=3, max_length=5000)]
+"""Corners of a closed line."""
+
+
+class PolygonSection(StructureSection):
+    """A building with a polygon in plan, in modules whose centres it covers.
+
+    Attributes:
+        outline_m: Corners of its outline, in either order.
+        courtyards_m: Corners of each of its courtyards.
+    """
+
+    kind: Literal["polygon"]
+    outline_m: Corners
+    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100)] = ()
+
+    @model_validator(mode="after")
+    def _check_rings(self) -> Self:
+        """Refuse outlines that cross themselves, and those without a module or with too many."""
+        from blast_env.site.footprint import footprint_problem
+
+        problem = footprint_problem(self.outline_m, self.courtyards_m)
+        if not problem and self.footprint.area_m2 > MOST_MODULES * MODULE_SIDE_M**2:
+            most_m2 = MOST_MODULES * MODULE_SIDE_M**2
+            problem = f"encloses {self.footprint.area_m2:,.0f} m2, must be at most {most_m2:,.0f}"
+        if not problem and not self.footprint.cells:
+            problem = (
+                f"encloses {self.footprint.area_m2:.3g} m2 and the centre of no module, must cover"
+                f" the centre of a square of the grid of {MODULE_SIDE_M:g} m"
+            )
+        if problem:
+            raise ScenarioError(self.name, [Problem("outline_m", problem)])
+        return self
+
+    @property
+    def footprint(self) -> "Footprint":
+        """Its polygon."""
+        from blast_env.site.footprint import footprint_of
+
+        return footprint_of(self.outline_m, self.courtyards_m)
+
+    @property
+    def corner_m(self) -> PointM:
+        """Lower left corner of the grid of its modules."""
+        return self.footprint.corner_m
+
+    @property
+    def rows(self) -> int:
+        """Rows of the grid of its modules."""
+        return self.footprint.shape[0]
+
+    @property
+    def columns(self) -> int:
+        """Columns of the grid of its modules."""
+        return self.footprint.shape[1]
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return len(self.footprint.cells)
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Rows and columns of its modules, row by row."""
+        return self.footprint.cells
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """Its modules in few rectangles."""
+        return self.footprint.boxes_m
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle around its modules."""
+        return Rectangle.around(self.boxes_m)
+
+
+AnyStructure = Annotated[
+    ModularObstacleSection | ConcreteSquareSection | PolygonSection, Field(discriminator="kind")
+]
+
+
+def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStructure]]:
+    """Return structures by the names of their buildings, in order."""
+    buildings: dict[str, list[AnyStructure]] = {}
+    for each in structures:
+        buildings.setdefault(each.building_name, []).append(each)
+    return buildings
