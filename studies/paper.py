@@ -1,11 +1,20 @@
 """The paper's Tables 1 to 4 and Figure 5, from its columns. Nothing is simulated."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import pandas as pd
 import typer
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from blast_env.calibration import (
+    PAPER_UFC_LABEL,
+    LinearLaw,
+    ProportionalLaw,
+    ScalingLaw,
+    paper_table,
+)
 from blast_env.cli.output import (
     print_line,
     print_table,
@@ -23,8 +32,13 @@ from blast_env.particles.paper import (
     deviations,
     metrics_row,
 )
-from blast_env.plots.calibration_figures import figure_5
+from blast_env.plots.plan import INK
+from blast_env.plots.style import unit_interval
 from blast_env.tables import write_csv
+from blast_env.units import PA_PER_PSI
+
+# Okabe and Ito's colours, distinguishable with any colour vision.
+_LOOKS: Final = (("#0072B2", "--", "s"), ("#009E73", "-.", "^"), ("#D55E00", "-", "D"))
 
 
 def main(
@@ -90,6 +104,61 @@ def print_coefficients() -> None:
             rows.append((law.name, source, ", ".join(named), *errors))
     headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
     print_table("Coefficients, and the row of Table 4 that they give", headers, rows, 3)
+
+
+def figure_5() -> Figure:
+    """Return the paper's Figure 5 for all three laws, with the deviations below it."""
+    figure = Figure(figsize=(7.0, 7.2), layout="constrained")
+    impulse, deviation = figure.subplots(2, 1, sharex=True, height_ratios=(2.1, 1.0))
+    paper = paper_table()
+    look: dict[str, Any] = {"color": unit_interval(INK), "linewidth": 1.4}
+    deviation.axhline(0.0, **look)
+    look |= {"marker": "o", "markersize": 6.5}
+    impulse.plot(paper["r_m"], paper["i_ufc_psi_s"], label=PAPER_UFC_LABEL, **look)
+    for paper_law, (colour, style, marker) in zip(PAPER_LAWS, _LOOKS, strict=True):
+        law = paper_law.fitted
+        scaled = law(paper["i_sim"])
+        look = {"color": colour, "linestyle": style, "linewidth": 1.6, "marker": marker}
+        look |= {"markersize": 6.0, "markeredgecolor": "white", "markeredgewidth": 0.7}
+        impulse.plot(paper["r_m"], scaled, label=_formula(law), **look)
+        deviation.plot(paper["r_m"], 100.0 * (scaled / paper["i_ufc_psi_s"] - 1.0), **look)
+    _label_paper(impulse, deviation)
+    return figure
+
+
+def _label_paper(impulse: Axes, deviation: Axes) -> None:
+    """Write the title, axes and legend of Figure 5."""
+    impulse.set_title("The paper's simulation, scaled by its three laws", fontweight="bold")
+    impulse.set(ylabel="impulse (psi s)", ylim=(0.0, 1.2))
+    impulse.legend(framealpha=1.0, edgecolor="none", labelspacing=0.7, handlelength=3.2)
+    in_pa = impulse.twinx()
+    in_pa.set(ylabel="impulse (Pa s)", ylim=(0.0, 1.2 * PA_PER_PSI))
+    in_pa.spines["top"].set_visible(False)
+    ticks = paper_table()["r_m"].tolist()
+    deviation.set(
+        xlabel="distance $R$ (m)", ylabel="deviation from the\nUFC column (%)", xticks=ticks
+    )
+    for axes in (impulse, deviation):
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def _formula(law: ScalingLaw) -> str:
+    """Return a law as a legend entry."""
+    numbers = [_number(value) for value in law.coefficients.values()]
+    simulated = r"i_\mathrm{sim}"
+    match law:
+        case ProportionalLaw():
+            return rf"proportional, ${numbers[0]}\,{simulated}$"
+        case LinearLaw():
+            return rf"linear, ${numbers[0]} + {numbers[1]}\,{simulated}$"
+        case _:
+            return rf"power law, ${numbers[0]}\,{simulated}^{{\,{numbers[1]}}}$"
+
+
+def _number(value: float) -> str:
+    digits, _, exponent = f"{value:.3e}".partition("e")
+    return f"{value:.4g}" if abs(value) > 1e-2 else rf"{digits} \times 10^{{{int(exponent)}}}"
 
 
 if __name__ == "__main__":

@@ -1,24 +1,15 @@
-"""A calibration as a figure, and the paper's Figure 5."""
+"""A calibration as a figure."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from blast_env.calibration import (
-    PAPER_UFC_LABEL,
-    LinearLaw,
-    ProportionalLaw,
-    ScalingLaw,
-    paper_table,
-)
 from blast_env.particles.calibration.free_field import CalibrationReport
 from blast_env.particles.calibration.model import SimulatedQuantity
-from blast_env.particles.paper import PAPER_LAWS
-from blast_env.plots.plan import INK
 from blast_env.plots.site_plan import write_heading
-from blast_env.plots.style import number_on_axis, render_extra, unit_interval
+from blast_env.plots.style import number_on_axis, render_extra
 from blast_env.units import PA_PER_PSI
 
 with render_extra():
@@ -41,7 +32,6 @@ _SIMULATED_LABELS: Final[Mapping[SimulatedQuantity, str]] = MappingProxyType(
 )
 
 _LEAST_TICK_RATIO: Final = 1.18
-_PAPER_LOOKS: Final = (("#0072B2", "--", "s"), ("#009E73", "-.", "^"), ("#D55E00", "-", "D"))
 _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
 
@@ -151,58 +141,3 @@ def _spread_out(distances_m: list[float]) -> list[float]:
         if distance_m * _LEAST_TICK_RATIO <= kept[-1]:
             kept.append(distance_m)
     return kept[::-1]
-
-
-def figure_5() -> Figure:
-    """Return the paper's Figure 5 for all three laws, with the deviations below it."""
-    figure = Figure(figsize=(7.0, 7.2), layout="constrained")
-    impulse, deviation = figure.subplots(2, 1, sharex=True, height_ratios=(2.1, 1.0))
-    paper = paper_table()
-    look: dict[str, Any] = {"color": unit_interval(INK), "linewidth": 1.4}
-    deviation.axhline(0.0, **look)
-    look |= {"marker": "o", "markersize": 6.5}
-    impulse.plot(paper["r_m"], paper["i_ufc_psi_s"], label=PAPER_UFC_LABEL, **look)
-    for paper_law, (colour, style, marker) in zip(PAPER_LAWS, _PAPER_LOOKS, strict=True):
-        law = paper_law.fitted
-        scaled = law(paper["i_sim"])
-        look = {"color": colour, "linestyle": style, "linewidth": 1.6, "marker": marker}
-        look |= {"markersize": 6.0, "markeredgecolor": "white", "markeredgewidth": 0.7}
-        impulse.plot(paper["r_m"], scaled, label=_formula(law), **look)
-        deviation.plot(paper["r_m"], 100.0 * (scaled / paper["i_ufc_psi_s"] - 1.0), **look)
-    _label_paper(impulse, deviation)
-    return figure
-
-
-def _label_paper(impulse: Axes, deviation: Axes) -> None:
-    """Write the title, axes and legend of Figure 5."""
-    impulse.set_title("The paper's simulation, scaled by its three laws", fontweight="bold")
-    impulse.set(ylabel="impulse (psi s)", ylim=(0.0, 1.2))
-    impulse.legend(framealpha=1.0, edgecolor="none", labelspacing=0.7, handlelength=3.2)
-    in_pa = impulse.twinx()
-    in_pa.set(ylabel="impulse (Pa s)", ylim=(0.0, 1.2 * PA_PER_PSI))
-    in_pa.spines["top"].set_visible(False)
-    ticks = paper_table()["r_m"].tolist()
-    deviation.set(
-        xlabel="distance $R$ (m)", ylabel="deviation from the\nUFC column (%)", xticks=ticks
-    )
-    for axes in (impulse, deviation):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-
-
-def _formula(law: ScalingLaw) -> str:
-    """Return a law as a legend entry."""
-    numbers = [_number(value) for value in law.coefficients.values()]
-    simulated = r"i_\mathrm{sim}"
-    match law:
-        case ProportionalLaw():
-            return rf"proportional, ${numbers[0]}\,{simulated}$"
-        case LinearLaw():
-            return rf"linear, ${numbers[0]} + {numbers[1]}\,{simulated}$"
-        case _:
-            return rf"power law, ${numbers[0]}\,{simulated}^{{\,{numbers[1]}}}$"
-
-
-def _number(value: float) -> str:
-    digits, _, exponent = f"{value:.3e}".partition("e")
-    return f"{value:.4g}" if abs(value) > 1e-2 else rf"{digits} \times 10^{{{int(exponent)}}}"

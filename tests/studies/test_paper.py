@@ -9,7 +9,8 @@ from typer import Typer
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario
-from blast_env.particles.paper import LINEAR, comparison_table
+from blast_env.calibration import PAPER_UFC_LABEL
+from blast_env.particles.paper import LINEAR, POWER, PROPORTIONAL, comparison_table
 from studies import engines, paper
 from studies.engines import HEADERS, Agreement, agreements, relative_difference
 
@@ -35,6 +36,26 @@ def test_the_paper_s_tables_are_printed_and_written(tmp_path: Path) -> None:
         comparison_table(LINEAR)["e_percent"].to_numpy()
     )
     assert (out / "figure_5.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_figure_5_has_the_column_and_the_three_laws() -> None:
+    impulse, deviation, in_pa = paper.figure_5().axes
+    legend = impulse.get_legend()
+    assert legend is not None
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert labels[0] == PAPER_UFC_LABEL
+    assert [label.partition(",")[0] for label in labels[1:]] == [
+        "proportional",
+        "linear",
+        "power law",
+    ]
+    curves = [np.asarray(line.get_ydata(), dtype=float) for line in impulse.lines]
+    assert curves[1] == pytest.approx(comparison_table(PROPORTIONAL)["i_scaled_psi_s"].to_numpy())
+    errors = [np.asarray(line.get_ydata(), dtype=float) for line in deviation.lines[1:]]
+    for law, error in zip((PROPORTIONAL, LINEAR, POWER), errors, strict=True):
+        assert np.abs(error) == pytest.approx(comparison_table(law)["e_percent"].to_numpy())
+    scales = np.array(in_pa.get_ylim()) / np.array([1.0, impulse.get_ylim()[1]])
+    assert scales == pytest.approx([0.0, 6894.757293168])
 
 
 def test_a_folder_that_cannot_be_made_is_the_user_s_error(tmp_path: Path) -> None:

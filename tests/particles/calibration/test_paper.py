@@ -9,13 +9,10 @@ is the difference of two cells that were rounded to four decimals before, so ano
 from importlib.resources import files
 from io import StringIO
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from blast_env.calibration import PAPER_UFC_LABEL
 from blast_env.particles.paper import (
-    LINEAR,
     PAPER_LAWS,
     POWER,
     PROPORTIONAL,
@@ -24,7 +21,6 @@ from blast_env.particles.paper import (
     comparison_table,
     metrics_row,
 )
-from blast_env.plots.calibration_figures import figure_5
 
 HALF_UNIT = 0.5 + 1e-6
 """Half a unit of the last digit; the rest is the rounding of our own subtraction."""
@@ -95,23 +91,3 @@ def test_the_coefficients_of_the_text_contradict_the_tables() -> None:
         for value, text in zip(metrics_row(law.in_text), expected, strict=True):
             assert units_off(value, text) <= HALF_UNIT
         assert not any(text == cell for text, cell in zip(expected, TABLE_4[law.name], strict=True))
-
-
-def test_figure_5_has_the_column_and_the_three_laws() -> None:
-    impulse, deviation, in_pa = figure_5().axes
-    legend = impulse.get_legend()
-    assert legend is not None
-    labels = [text.get_text() for text in legend.get_texts()]
-    assert labels[0] == PAPER_UFC_LABEL
-    assert [label.partition(",")[0] for label in labels[1:]] == [
-        "proportional",
-        "linear",
-        "power law",
-    ]
-    curves = [np.asarray(line.get_ydata(), dtype=float) for line in impulse.lines]
-    assert curves[1] == pytest.approx(comparison_table(PROPORTIONAL)["i_scaled_psi_s"].to_numpy())
-    errors = [np.asarray(line.get_ydata(), dtype=float) for line in deviation.lines[1:]]
-    for law, error in zip((PROPORTIONAL, LINEAR, POWER), errors, strict=True):
-        assert np.abs(error) == pytest.approx(comparison_table(law)["e_percent"].to_numpy())
-    scales = np.array(in_pa.get_ylim()) / np.array([1.0, impulse.get_ylim()[1]])
-    assert scales == pytest.approx([0.0, 6894.757293168])
