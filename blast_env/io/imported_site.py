@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from blast_env.io.importing import FittedBuilding, ImportedSite
 from blast_env.plots.plan import (
     INK,
@@ -20,6 +18,7 @@ from blast_env.plots.site_plan import (
     draw_plan,
     legend_of,
     outline_path,
+    trim_height,
     write_heading,
     write_legend,
     write_names,
@@ -35,9 +34,7 @@ with render_extra():
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch, PathPatch
 
-_WIDTH_IN = 10.0
-_LEAST_IN, _MOST_IN = 5.0, 11.0
-_HEADING_IN = 1.7
+_WIDTH_IN, _HEIGHT_IN = 10.0, 11.0  # at most as high
 _FAINT = 0.35
 
 
@@ -60,9 +57,7 @@ def imported_plan(imported: ImportedSite) -> Figure:
     North is marked, and each building has its name and the deviation of its modules.
     """
     scenario = imported.scenario
-    width_m, height_m = scenario.site.width_m, scenario.site.height_m
-    height_in = np.clip(_WIDTH_IN * height_m / width_m + _HEADING_IN, _LEAST_IN, _MOST_IN)
-    figure = Figure(figsize=(_WIDTH_IN, float(height_in)), layout="constrained")
+    figure = Figure(figsize=(_WIDTH_IN, _HEIGHT_IN), layout="constrained")
     axes = figure.subplots()
     labelled = site_features(scenario)
     features = without(labelled, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.TERRACE)
@@ -78,6 +73,7 @@ def imported_plan(imported: ImportedSite) -> Figure:
         f"{imported.site.path.name}, turned by {imported.site.rotation_deg:.1f}°; modules at most "
         f"{worst.deviation.outline_m:.2f} m from an outline ({worst.name})",
     )
+    trim_height(figure, [axes])
     write_names(axes, list(_with_deviations(labelled, imported.buildings)))
     return figure
 

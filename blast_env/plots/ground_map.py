@@ -37,13 +37,14 @@ from blast_env.plots.site_plan import (
     draw_features,
     draw_plan,
     legend_of,
+    trim_height,
     write_heading,
     write_legend,
     write_names,
 )
 from blast_env.plots.style import barrier_text, render_extra, short_number, unit_interval
 from blast_env.response.buildings import GroundThreshold, ground_thresholds
-from blast_env.site.blast_site import BlastSite, Charge
+from blast_env.site.blast_site import Charge
 from blast_env.units import PA_PER_KPA
 
 with render_extra():
@@ -71,7 +72,7 @@ _FINER_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
 _OPEN_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
     {"color": "0.15", "linewidth": 1.2, "linestyle": (0, (4.0, 2.0))}
 )
-_MAP_HEIGHTS_IN: Final = (3.4, 7.0)
+_HEIGHT_IN: Final = 8.7  # at most
 
 
 def ground_recorders(grid: GasGrid) -> tuple[GroundMap, ...]:
@@ -182,7 +183,7 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
         BlastEnvError: If a blast was run without the recorders, or site or charge differ.
     """
     results, thresholds = both_results(result, beside), ground_thresholds()
-    figure, plans = _plans(results, 0.9)
+    figure, plans = _plans(results)
     levels = [each.peak_pa for each in thresholds]
     for axes, each in zip(plans, results, strict=True):
         x_m, y_m, inside = _on_site(each, ground_values(each, "peak"))
@@ -210,10 +211,11 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
     return figure
 
 
-def _plans(results: Sequence[GasResult], more_in: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+def _plans(results: Sequence[GasResult]) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure with the empty ground of each site."""
-    width_in, height_in = _map_size_in(results[0].run.site, len(results))
-    figure = Figure(figsize=(width_in, height_in + more_in), layout="constrained")
+    count = len(results)
+    width_in = count * _MAP_WIDTHS_IN[0 if count > 1 else 1] + 1.6
+    figure = Figure(figsize=(width_in, _HEIGHT_IN), layout="constrained")
     plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
     for axes, each in zip(plans, results, strict=True):
         draw_plan(axes, [feature for feature in _features(each) if feature.kind is Kinds.SITE])
@@ -247,7 +249,9 @@ def _write(
     write_legend(figure, handles)
     title, subtitle = gas_heading(results, what)
     write_heading(figure, title, f"{subtitle}; {note}")
-    for axes, each in zip(figure.axes, results, strict=False):
+    plans = figure.axes[: len(results)]
+    trim_height(figure, plans)
+    for axes, each in zip(plans, results, strict=True):
         write_names(axes, _features(each))
 
 
@@ -285,13 +289,6 @@ def _risk_words(threshold: GroundThreshold, charge: Charge) -> str:
 def _features(result: GasResult) -> tuple[Feature, ...]:
     blast = result.blast
     return blast_features(blast.scenario, blast.layout, blast.site.charge)
-
-
-def _map_size_in(site: BlastSite, count: int) -> tuple[float, float]:
-    width, height = site.site_m.right - site.site_m.left, site.site_m.top - site.site_m.bottom
-    plan_in = _MAP_WIDTHS_IN[0 if count > 1 else 1]
-    low, high = _MAP_HEIGHTS_IN
-    return count * plan_in + 1.6, min(max(plan_in * height / width, low), high) + 1.7
 
 
 def _on_site(result: GasResult, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -18,6 +18,7 @@ from blast_env.plots.plan import (
 from blast_env.plots.site_plan import (
     draw_plan,
     legend_of,
+    trim_height,
     write_heading,
     write_legend,
     write_names,
@@ -32,11 +33,8 @@ with render_extra():
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-_PANEL_IN: Final = 5.4
 _WIDTHS_IN: Final = (4.6, 8.8)
-_AXIS_IN: Final = 0.6
-_HEADING_IN: Final = 0.9
-_LEGEND_ROW_IN: Final = 0.24
+_SITE_IN, _HEIGHT_IN = 5.4, 8.0  # heights at most
 _ARROW_PT: Final = 32.0
 
 
@@ -75,17 +73,18 @@ def plan_figure(
         handles: Further entries of the legend.
         heading: Title and subtitle.
     """
-    width_in, height_in = _panel_in(scenario)
-    height_in += _HEADING_IN if heading else 0.0
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    lines = write_legend(figure, [*legend_of(features), *handles])
-    figure.set_figheight(height_in + lines * _LEGEND_ROW_IN)
+    least_in, most_in = _WIDTHS_IN
+    ratio = scenario.site.width_m / scenario.site.height_m
+    width_in = min(max(_SITE_IN * ratio, least_in), most_in)
+    figure = Figure(figsize=(width_in, _HEIGHT_IN), layout="constrained")
+    write_legend(figure, [*legend_of(features), *handles])
     axes = figure.subplots()
     draw_plan(axes, features)
     _draw_scale(axes, scenario)
     draw_north(axes, scenario)
     if heading:
         write_heading(figure, *heading)
+    trim_height(figure, [axes])
     write_names(axes, features)
     return figure
 
@@ -100,14 +99,6 @@ def _items_left(zone: BuildZone | None, placement: LayoutState) -> list[Artist]:
         for name, colour in item_colours(zone).items()
         if words[name] == standing[name]
     ]
-
-
-def _panel_in(scenario: Scenario) -> tuple[float, float]:
-    """Return the width and height of the plan with its axes, inches."""
-    ratio = scenario.site.width_m / scenario.site.height_m
-    least_in, most_in = _WIDTHS_IN
-    width_in = min(max(_PANEL_IN * ratio, least_in), most_in)
-    return width_in, min(width_in / ratio + _AXIS_IN, _PANEL_IN)
 
 
 def _subtitle(scenario: Scenario, placement: LayoutState) -> str:

@@ -335,7 +335,7 @@ def write_names(axes: Axes, features: Sequence[Feature], *, inside: bool = True)
     if figure is None or not labels:
         return []
     texts = [_text(axes, label.text, label.feature.kind) for label in labels]
-    _lay_out(figure)
+    lay_out(figure)
     pixels_per_pt = figure.dpi / 72.0
     extents = [text.get_window_extent() for text in texts]
     settled = settled_labels(
@@ -372,7 +372,19 @@ def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:
     return text
 
 
-def _lay_out(figure: Figure) -> None:
+def trim_height(figure: Figure, panels: Iterable[Axes]) -> None:
+    """Take the height from a figure that its panels with equal scales along x and y leave free."""
+    lay_out(figure)
+    free: dict[int, float] = {}
+    for axes in panels:
+        place = axes.get_subplotspec()
+        assert place is not None
+        share = axes.get_position(original=True).height - axes.get_position().height
+        free[place.rowspan.start] = min(share, free.get(place.rowspan.start, share))
+    figure.set_figheight(figure.get_figheight() * (1.0 - sum(free.values())))
+
+
+def lay_out(figure: Figure) -> None:
     """Position the axes as in drawing, without the cost of drawing."""
     engine = figure.get_layout_engine()
     if engine is not None:

@@ -26,7 +26,7 @@ from blast_env.plots.plan import (
 )
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 from blast_env.plots.site_picture import plan_figure
-from blast_env.plots.site_plan import draw_plan, rectangle_patch, write_names
+from blast_env.plots.site_plan import draw_plan, rectangle_patch, trim_height, write_names
 from blast_env.plots.style import render_extra, unit_interval
 from blast_env.report.loads import MeasuredBlast, ReportedBuilding
 from blast_env.report.outcomes import ItemWorth
@@ -42,7 +42,6 @@ with render_extra():
 
 _DOTS_PER_IN: Final = 150
 _WIDTH_IN: Final = 6.5  # letters of 10 points stay legible where A4 leaves a figure its height
-_HEIGHTS_IN: Final = (2.8, 6.2)
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
 
 Picture = tuple[str, bytes]
@@ -79,11 +78,6 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
         features.append(charge_feature(charge, threat.name, label))
         features.append(stand_off_feature(scenario.structures, charge.position_m))
     return png(plan_figure(scenario, in_order(features)))
-
-
-def _height_in(scenario: Scenario) -> float:
-    low, high = _HEIGHTS_IN
-    return min(max(_WIDTH_IN * scenario.site.height_m / scenario.site.width_m, low), high)
 
 
 # A threat.
@@ -165,7 +159,7 @@ def risk_picture(unprotected: MeasuredBlast, protected: MeasuredBlast) -> Pictur
 
 def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     """Return the layout with every module or piece in the colour of its worth."""
-    figure, axes = _page(_height_in(scenario) + 0.3)
+    figure, axes = _page(_WIDTH_IN)
     features = without(site_features(scenario), Kinds.CHARGE_PLACE)
     draw_plan(axes, features)
     worths = 100.0 * np.array([each.worth for each in items])
@@ -182,7 +176,9 @@ def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     (left, bottom), (right, top) = low - reach_m, high + reach_m
     axes.set_xlim(max(left, 0.0), min(right, scenario.site.width_m))
     axes.set_ylim(max(bottom, 0.0), min(top, scenario.site.height_m))
-    bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
+    colours = ScalarMappable(scale, modules.get_cmap())
+    bar = figure.colorbar(colours, ax=axes, location="bottom", shrink=0.8)
     bar.set_label("contribution: percentage points of reduction lost without the item")
+    trim_height(figure, [axes])
     write_names(axes, features)
     return png(figure)
