@@ -26,10 +26,10 @@ from blast_env.app.records import (
     worst_first,
     write_kept,
 )
-from blast_env.app.verdicts import keep_histories
+from blast_env.app.verdicts import keep_facades
 from blast_env.app.work import Teller
 from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.consequences import unchecked
+from blast_env.evaluation.consequences import consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.gas.settings import Cells
@@ -143,12 +143,13 @@ class BlastTask:
             write_kept(scale, folder / _SCALE)
         evaluator = BlastEvaluator(site, engine, cache=self.cache)
         evaluator.keep(layout, threat, result.loads())  # for searches, reports and others
-        keep_histories(result, folder)
+        found = consequences_of(site, result, blast.site.charge)
+        keep_facades(found, folder)
         film = _film(shot, scale, folder, share_of(tell, 60, 100, 25))
         names = result.structures["structure"]
         notes = [note for name in names for note in result.impulse(name).notes]
         notes += [*result.stepped_notes, *result.gauge_notes]
-        unjudged = ((each.building, each.words) for each in result.unjudged)
+        unjudged = ((each.building, each.words) for each in found.unjudged)
         charge = blast.site.charge
         record = BlastRecord(
             key=folder.name,
@@ -157,7 +158,7 @@ class BlastTask:
             layout=placing.plain(layout),
             loads=result.structure_loads,
             notes=tuple(dict.fromkeys(notes)),
-            unchecked=(*unchecked(site, result), *unjudged),
+            unchecked=(*found.unchecked, *unjudged),
             pictures=(film, *_pictures(result, scale, folder)),
             seconds=perf_counter() - began_s,
             repeat={

@@ -509,8 +509,7 @@ class Session:
 
     def _facades(self, shown: Shown, threat: LoadCase) -> Consequences | None:
         folder = self.folder.blast_of(shown.key)
-        cell_m = self.engine.smallest_m
-        return stored_consequences(self.scenario, shown.layout, threat.charge, cell_m, folder)
+        return stored_consequences(self.scenario, shown.layout, threat.charge, folder)
 
 
 @dataclass

@@ -4,12 +4,9 @@ Other windows and hardening measures need no new blast: the loads stay the same.
 """
 
 from collections.abc import Iterable, Sequence
-from io import BytesIO
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, NamedTuple
-from zipfile import BadZipFile
-
-import numpy as np
+from typing import Final, NamedTuple
 
 from blast_env.app.records import BlastRecord
 from blast_env.evaluation.answers import AnswerTable
@@ -18,17 +15,14 @@ from blast_env.evaluation.consequences import (
     BuildingSummary,
     Consequences,
     Severity,
-    by_building,
 )
 from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
+from blast_env.evaluation.shared import decoded, encoded
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.layout.build_site import build_site
-from blast_env.layout.placement import load_relevant
-from blast_env.response.facade import peak_factor, respond
 from blast_env.site import AnyCharge, Scenario
 
-_BAYS: Final = "bays.npz"
+_FACADES: Final = "facades.bin"
 _HEADERS: Final = (
     *("layout", "threat", "building", "level of protection", "its probability", "panes broken"),
     *("worst pane (GSA, ISO)", "worst wall panel", "standing of the load", "flags"),
@@ -38,51 +32,30 @@ _DPI: Final = 100
 _DRAWS: Final = 200  # of the uncertain quantities: the table must come at once
 
 
-def keep_histories(result: Any, folder: Path) -> None:
-    """Keep the histories of the bays of a blast by gas dynamics.
+def keep_facades(found: Consequences, folder: Path) -> None:
+    """Keep the consequences of a blast, with the histories of the bays.
 
     Raises:
         BlastEnvError: If they cannot be written.
     """
-    loads = result.bay_loads
-    if not loads.bays:
-        return
-    with write_atomically(folder / _BAYS) as temporary:
-        np.savez(
-            temporary,
-            names=np.array([each.bay.name for each in loads.bays]),
-            time_s=loads.recorder.time_s,
-            pressure_pa=loads.history_pa,
-        )
+    with write_atomically(folder / _FACADES) as temporary:
+        temporary.write_bytes(encoded(found))
 
 
 def stored_consequences(
-    scenario: Scenario, layout: Layout, charge: AnyCharge, cell_m: float, folder: Path
+    scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path
 ) -> Consequences | None:
-    """Return the response of the facades to a stored blast; `None` without their histories.
+    """Return the response of the present facades to a stored blast; `None` without histories.
 
     Args:
         scenario: The scenario.
         layout: The layout, whose measures fill the bays.
         charge: The charge, or the vehicle that carries it.
-        cell_m: Side of the cells of the blast.
-        folder: Its folder.
+        folder: The folder of the blast.
     """
-    try:
-        content = BytesIO((folder / _BAYS).read_bytes())  # closes a damaged file, too
-        with np.load(content, allow_pickle=False) as kept:
-            names, time_s, pressure = (kept[key] for key in ("names", "time_s", "pressure_pa"))
-    except (OSError, ValueError, KeyError, BadZipFile):
-        return None
-    known = {each.bay.name: each for each in scenario.bays_with(layout)}
-    rows = [row for row, name in enumerate(names.tolist()) if name in known]
-    if not rows:
-        return None
-    bays = [known[names[row]] for row in rows]
-    site = build_site(scenario, load_relevant(layout), 0, charge)
-    found = respond(bays, time_s, pressure[rows].astype(np.float64))
-    factor = peak_factor(cell_m, site.charge.tnt_kg)
-    return Consequences(tuple(by_building(scenario, found, site, factor)))
+    with suppress(OSError, ValueError):
+        return decoded((folder / _FACADES).read_bytes(), scenario, layout, charge)
+    return None
 
 
 class Judged(NamedTuple):

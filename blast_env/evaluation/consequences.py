@@ -525,13 +525,13 @@ def consequences_of(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
         (BarrierResponse(charge, result.pieces, taken_away),),
-        tuple(unchecked(scenario, result)),
+        tuple(_unchecked(scenario, result)),
         result.unjudged,
         (BlastLoads(result.structure_loads, result.module_impulse_n_s),),
     )
 
 
-def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
+def _unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
     """Yield each building with doubtful loads, and the reasons.
 
     The loads are outside the validated range of the engine or the response, or not known.

@@ -1,7 +1,8 @@
 """The consequences of charges, with blasts in a store, so that commands share them.
 
 A content has the histories of the bays, from which the response is computed again, and the other
-numbers as they were. Its key has all inputs: those of the blast, and the whole site and layout.
+numbers as they were. Its key has all inputs: those of the blast, and the whole site. Measures that
+harden facades are left out: they change the response alone.
 """
 
 import json
@@ -29,6 +30,7 @@ from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Element, Layout
 from blast_env.layout.build_site import build_site, charge_against
+from blast_env.layout.placement import load_relevant
 from blast_env.response.facade import respond
 from blast_env.site import AnyCharge, Scenario
 from blast_env.tables import table_of
@@ -84,7 +86,7 @@ def consequences(
 
 def _shared(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> Consequences:
     scenario = evaluator.scenario
-    decode = partial(_decoded, scenario=scenario, layout=layout, charge=charge)
+    decode = partial(decoded, scenario=scenario, layout=layout, charge=charge)
     found = evaluator.store.read(_key(evaluator, layout, charge), decode)
     if found is None:
         where = charge_against(scenario, layout, charge)
@@ -133,16 +135,17 @@ def keep_consequences(
     No piece of the layout was taken away.
     """
     if evaluator.store.has_file:
-        evaluator.store.put(_key(evaluator, layout, charge), _encoded(found))
+        evaluator.store.put(_key(evaluator, layout, charge), encoded(found))
 
 
 def _key(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> str:
-    inputs = evaluator.scenario.model_dump_json() + repr(layout)
+    inputs = evaluator.scenario.model_dump_json() + repr(load_relevant(layout))
     blast = evaluator.key(layout, LoadCase(charge))
     return json.dumps(("consequences", blast, sha256(inputs.encode()).hexdigest()))
 
 
-def _encoded(found: Consequences) -> bytes:
+def encoded(found: Consequences) -> bytes:
+    """Return the consequences of one charge as bytes; no piece of the layout was taken away."""
     (barrier,), (loads,) = found.barriers, found.loads
     facades = [each.on_cells for each in found.responses]
     time_s = facades[0].time_s if facades else np.zeros(0)
@@ -165,7 +168,12 @@ def _encoded(found: Consequences) -> bytes:
     return b"\n".join((line, b"".join(each.tobytes() for each in arrays)))
 
 
-def _decoded(content: bytes, scenario: Scenario, layout: Layout, charge: AnyCharge) -> Consequences:
+def decoded(content: bytes, scenario: Scenario, layout: Layout, charge: AnyCharge) -> Consequences:
+    """Return the consequences of `encoded`, with the present panes and walls in the same bays.
+
+    Raises:
+        ValueError: If the content is damaged, or of other bays.
+    """
     line, _, arrays = content.partition(b"\n")
     header = _HEADER.validate_json(line)
     times, modules = header.times, header.modules
@@ -178,10 +186,12 @@ def _decoded(content: bytes, scenario: Scenario, layout: Layout, charge: AnyChar
             (arrays[ends[1] :], "<f4"),
         )
     )
-    site = build_site(scenario, layout, 0, charge)
+    site = build_site(scenario, load_relevant(layout), 0, charge)
     responses = []
     if header.bays:
         bays = {each.bay.name: each for each in scenario.bays_with(layout)}
+        if not bays.keys() >= {*header.bays}:
+            raise ValueError("the bays are those of another facade")
         own = [bays[name] for name in header.bays]
         facade = respond(own, time_s, pressure.reshape(len(own), times))
         responses = by_building(scenario, facade, site, header.peak_factor, header.known)

@@ -137,7 +137,7 @@ def test_a_damaged_file_of_histories_gives_no_verdict(blasted: Session) -> None:
     blasted.put("wall", blasted.design.with_layout(WALL))
     (threat,) = blasted.chosen_threats()
     own = blasted.shown(threat)[1]
-    path = blasted.folder.blast_of(own.key) / "bays.npz"
+    path = blasted.folder.blast_of(own.key) / "facades.bin"
     whole = path.read_bytes()
     path.write_bytes(whole[:-100])
     blasted._judged.clear()

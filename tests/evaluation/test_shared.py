@@ -13,6 +13,7 @@ from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from tests.report.sites import LAYOUT, glazed_hut
+from tests.site.test_hardening import TAKEN, glazed_yard
 
 CHARGE = Charge((2.0, 4.0), 5.0)
 
@@ -46,3 +47,16 @@ def test_a_stored_blast_has_the_same_consequences(
     assert known.counts.blasts == 0  # an evaluation has the loads of the same blast, too
     with pytest.raises(TypeError):
         consequences(known, (), [CHARGE])  # another layout is another blast
+
+
+def test_a_hardened_facade_responds_to_the_blast_of_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = glazed_yard(charges="mean")
+    charge = site.sample_charge(np.random.default_rng(0))
+    plain = consequences(evaluator(tmp_path, site), (), [charge])
+    fresh = consequences(evaluator(tmp_path / "other", site), (TAKEN,), [charge])
+    monkeypatch.setattr("blast_env.evaluation.shared._blasted", None)  # no blast
+    hardened = consequences(evaluator(tmp_path, site), (TAKEN,), [charge])
+    pd.testing.assert_frame_equal(tables(hardened)[0], tables(fresh)[0])
+    assert not tables(hardened)[0].equals(tables(plain)[0])
