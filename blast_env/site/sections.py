@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -35,8 +35,6 @@ from blast_env.site.problems import (
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import plain_text
 
-if TYPE_CHECKING:  # shapely takes a tenth of a second to import
-    pass
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
 Length = Annotated[StrictFloat, Field(ge=1e-3, le=2000.0)]
 PointM = tuple[Coordinate, Coordinate]

@@ -1,7 +1,7 @@
 """The sources of charges: points, lines, areas, and vehicles with their ways in."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -27,8 +27,6 @@ from blast_env.site.sections import (
 )
 from blast_env.units import MODULE_SIDE_M
 
-if TYPE_CHECKING:  # shapely takes a tenth of a second to import
-    pass
 VehicleMass = Annotated[StrictFloat, Field(ge=50.0, le=200_000.0)]
 """Mass of a vehicle, kg."""
 
