@@ -15,7 +15,6 @@ from blast_env.cli.options import (
     CacheOption,
     ChargeOption,
     ClusterAddress,
-    CvarOption,
     EngineChoice,
     FinalCellOption,
     FinalCellsOption,
@@ -82,7 +81,9 @@ def evaluate(
     engine: EngineChoice = JUDGE,
     cell_m: FinalCellOption = None,
     cells: FinalCellsOption = None,
-    cvar_level: CvarOption = CVAR_LEVEL,
+    cvar_level: float = typer.Option(
+        CVAR_LEVEL, help="Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
+    ),
     export: Path | None = typer.Option(
         None,
         help="Folder for the layout as JSON, CSV, GeoJSON and DXF; or a file with one of these "

@@ -108,12 +108,6 @@ RequireOption = Annotated[
         "'iso D', 'peak KPA' or 'impulse PA_S'. May be repeated.",
     ),
 ]
-CvarOption = Annotated[
-    float,
-    typer.Option(
-        "--cvar-level", help="Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
-    ),
-]
 ProcessesOption = Annotated[int, typer.Option("--processes", help="Worker processes.", min=1)]
 ClusterAddress = Annotated[
     str | None,

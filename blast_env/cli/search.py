@@ -20,7 +20,6 @@ from blast_env.cli.options import (
     CellsOption,
     ChargeOption,
     ClusterAddress,
-    CvarOption,
     EngineChoice,
     GivenCharge,
     ProcessesOption,
@@ -43,7 +42,12 @@ from blast_env.cli.output import (
     resumable,
     save_pictures,
 )
-from blast_env.design.proposal import PackageProposer, chosen_proposer, problem_of
+from blast_env.design.proposal import (
+    PackageProposer,
+    chosen_proposer,
+    problem_of,
+    search_problem,
+)
 from blast_env.design.rules import expected_charge
 from blast_env.design.search import (
     DesignProblem,
@@ -55,11 +59,9 @@ from blast_env.design.search import (
     proposers,
 )
 from blast_env.design.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
-from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
-from blast_env.envs.strategies import HiddenThreat
+from blast_env.envs.episode import find_risk
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
-    BlastEvaluator,
     Evaluation,
     Evaluators,
     LoadCase,
@@ -69,7 +71,7 @@ from blast_env.evaluation import (
     draw_threats,
 )
 from blast_env.evaluation.answers import load_text, percent, share_text
-from blast_env.evaluation.cases import one_of_each_charge, search_set
+from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, layout_counts
@@ -97,7 +99,7 @@ _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out",
 """Options that do not affect the layout."""
 
 _WITH_BLASTS: Final = (
-    *("budget", "seed", "threat", "threats", "realisations", "risk", "cvar_level", "engine"),
+    *("budget", "seed", "threat", "threats", "risk", "engine"),
     *("cell_m", "start_from", "surrogate", "held_out", "cluster", "cache"),
 )
 """Options of the searches by blasts alone."""
@@ -117,18 +119,12 @@ def search(
     threat: ThreatName = typer.Option(
         "visible", help="visible: one known charge; hidden: a layout for all possible charges."
     ),
-    threats: int | None = typer.Option(
-        None, help="Charges of a hidden threat; 16 unless given.", min=1
-    ),
-    realisations: int | None = typer.Option(
-        None, help="Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.", min=1
-    ),
+    threats: int = typer.Option(16, help="Charges of a hidden threat.", min=1),
     risk: str | None = typer.Option(
         None,
         help="mean, cvar or worst, over the charges.",
         show_default="as in the scenario's objective",
     ),
-    cvar_level: CvarOption = CVAR_LEVEL,
     engine: EngineChoice = JUDGE,
     cell_m: CellOption = None,
     cells: CellsOption = None,
@@ -176,23 +172,29 @@ def search(
         if out is not None:
             make_folder(out)
         proposer, digest = _method(method, site, start_from, surrogate)
-        model = find_threat_model(threat, threats)
-        repeats = find_realisations(realisations, threat, used)
-        measure = find_risk(risk, cvar_level)
-        if isinstance(model, HiddenThreat):
+        known = None
+        if threat == "hidden":
             refuse_given(
                 context, ("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"
             )
-            case = search_set(site, None, repeats, seed, measure, charges=model.threats)
         else:
+            refuse_given(context, ("threats",), "is for a hidden threat: a visible one is known")
             # The known charge is always drawn by the seed of the search.
-            drawn = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
-            case = search_set(site, drawn, repeats, seed, measure)
-        problem = DesignProblem(BlastEvaluator(site, used, cache=cache), case, processes)
+            known = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
+        problem = search_problem(
+            site,
+            known,
+            used,
+            cache,
+            threats=threats,
+            seed=seed,
+            risk=find_risk(risk, CVAR_LEVEL),
+            processes=processes,
+        )
         run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
         if run.result.interrupted and not run.result.history:
             raise KeyboardInterrupt  # there is no layout to keep
-        checked = _check(run, held_out, cvar_level, is_hidden=isinstance(model, HiddenThreat))
+        checked = _check(run, held_out, is_hidden=threat == "hidden")
         print_search(run, checked)
         if out is not None:
             options = {
@@ -262,9 +264,7 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.counts.cache_hits - hits)
 
 
-def _check(
-    run: SearchRun, held_out: int, cvar_level: float, *, is_hidden: bool
-) -> Evaluation | None:
+def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | None:
     """Evaluate the layout on threats of judgement; `None` if the search used all of them.
 
     Without noise a charge is one blast: a charge used by the search is not held out.
@@ -285,7 +285,6 @@ def _check(
             [LoadCaseSet(problem.scenario, threats)],
             [run.result.layout],
             problem.processes,
-            cvar_level=cvar_level,
             progress=progress,
         )
 

@@ -26,6 +26,7 @@ from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.blast_site import Charge
+from blast_env.site.objective import Risk
 from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import reductions
 
@@ -236,15 +237,34 @@ def search(
         BlastEnvError: If the scenario has no build zone, nothing arrives at the protected
             structures, or the method is not applicable to the budget.
     """
-    found = find_scenario(scenario)
-    evaluator = BlastEvaluator(found, engine, cache=cache)
-    known = "hidden" if charge is None else "visible"
-    realisations = find_realisations(None, known, evaluator.engine)
-    case = search_set(found, charge, realisations, seed, charges=threats)
-    problem = DesignProblem(evaluator, case, processes)
+    problem = search_problem(
+        scenario, charge, engine, cache, threats=threats, seed=seed, processes=processes
+    )
     proposer = find_proposer(method, tuple(tuple(each) for each in initial))
     blasts = proposer_row(method).budget if budget is None else budget
     return proposer.propose(problem, blasts, seed, report)
+
+
+def search_problem(
+    scenario: AnyScenario,
+    charge: AnyCharge | None,
+    engine: str | Engine = JUDGE,
+    cache: str | Path | None = None,
+    *,
+    threats: int = 16,
+    seed: int = 0,
+    risk: Risk | None = None,
+    processes: int = 1,
+) -> DesignProblem:
+    """Return the problem of a search; see `search` for the arguments.
+
+    `risk` is the risk measure over the charges; that of the scenario's objective unless given.
+    """
+    evaluator = BlastEvaluator(scenario, engine, cache=cache)
+    known = "hidden" if charge is None else "visible"
+    realisations = find_realisations(None, known, evaluator.engine)
+    case = search_set(evaluator.scenario, charge, realisations, seed, risk, charges=threats)
+    return DesignProblem(evaluator, case, processes)
 
 
 def problem_of(

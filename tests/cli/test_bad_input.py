@@ -50,7 +50,7 @@ BAD: dict[str, str] = {
     "judge --run . --scenario courtyard": "is no run folder",
     f"{SEARCH} --risk men": "did you mean 'mean'",
     f"{SEARCH} --start-from nowhere.json": "nowhere.json",
-    f"{SEARCH} --threats 4": "threats is 4, must be 1 unless threat is 'hidden'",
+    f"{SEARCH} --threats 4": "--threats is for a hidden threat",
     f"{SEARCH} --threat hidden --charge 5,9": "a hidden one is drawn",
     f"{SEARCH} --surrogate own.json": "--surrogate is for --method surrogate, not genetic",
     f"{SURROGATE} --surrogate own.json": "own.json: there is no such file",
