@@ -417,7 +417,7 @@ def test_a_map_says_what_is_a_terrace_in_the_words_of_the_format(said: Any, tmp_
 
 
 def test_a_building_on_it_is_imported_again_as_on_the_ground(tmp_path: Path) -> None:
-    """An L of two rectangles is one polygon."""
+    """An L of two rectangles is one building."""
     wing = {"name": "wing", "rows": 4, "columns": 4, "corner_m": [10.5, 3.5]}
     found = []
     for base_m, terraces in ((1.0, [TERRACE]), (0.0, [])):
@@ -426,14 +426,14 @@ def test_a_building_on_it_is_imported_again_as_on_the_ground(tmp_path: Path) -> 
         path = tmp_path / "plan.geojson"
         scenario = terraced(structures=[*parts, *terraces])
         export_layout(LayoutPlan(scenario, ()), path)
-        (own,) = (
-            each
-            for each in import_site(path, ImportOptions(stock=6)).scenario.structures
-            if each.protected
-        )
-        assert own.base_m == base_m
-        assert own.modules == sum(each.modules for each in scenario.structures if each.protected)
-        found.append(own.boxes_m)
+        again = import_site(path, ImportOptions(stock=6)).scenario
+        own = [each for each in again.structures if each.protected]
+        assert {each.base_m for each in own} == {base_m}
+        assert len({each.building for each in own} - {None}) == 1
+        assert sum(each.weight for each in own) == pytest.approx(1.0)
+        modules = sum(each.modules for each in scenario.structures if each.protected)
+        assert sum(each.modules for each in own) == modules
+        found.append([each.boxes_m for each in own])
     assert found[0] == found[1]
 
 

@@ -38,7 +38,7 @@ from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # needs the extra `maps`
-    from blast_env.io.importing.sketch import MapSketch
+    from blast_env.io.importing.convert import MapSketch
 
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, safe for colour-blind readers
 _REFUSED: Final = "#D55E00"

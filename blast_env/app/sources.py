@@ -18,7 +18,7 @@ from blast_env.site import SCHEMA_VERSION, Scenario, load_scenario
 
 if TYPE_CHECKING:
     from blast_env.io.importing import ImportedSite, ImportOptions
-    from blast_env.io.importing.sketch import MapSketch
+    from blast_env.io.importing.convert import MapSketch
 
 Made = TypeVar("Made")
 
@@ -87,7 +87,7 @@ def map_sketch(path: Path, options: "ImportOptions") -> "MapSketch":
     Raises:
         BlastEnvError: If it cannot be read, or has no building.
     """
-    from blast_env.io.importing.sketch import sketch_of  # here, because it needs `maps`
+    from blast_env.io.importing.convert import sketch_of  # here, because it needs `maps`
 
     return sketch_of(path, options)
 

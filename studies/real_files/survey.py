@@ -10,12 +10,10 @@ import shapely
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.io.importing.convert import read_map, selectors_of
-from blast_env.io.importing.ledger import Deed, Ledger
-from blast_env.io.importing.plane import DrawingPlane
-from blast_env.io.importing.roles import things_of
-from blast_env.io.importing.site_map import SiteMap
-from blast_env.io.importing.things import Role, Thing
+from blast_env.io.importing.convert import read_map
+from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.site_map import WGS84, SiteMap
+from blast_env.io.importing.things import Role, Thing, things_of
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
 SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf")
@@ -61,9 +59,9 @@ def files_of(folder: Path) -> list[Path]:
 
 def _surveyed(path: Path) -> Survey:
     """Import a file: its largest building is protected, on a site of 200 m in a large map."""
-    site_map, options = _read(path)
-    things = things_of(site_map, selectors_of(site_map, options), options, Ledger())
-    sound = [each for each in things if not each.fault]
+    site_map = _read(path)
+    options = site_map.options
+    sound = [each for each in things_of(site_map) if not each.fault]
     outlines = [each for each in sound if each.role is Role.BUILDING]
     if not outlines:
         import_site(path, options)  # says why
@@ -78,29 +76,27 @@ def _surveyed(path: Path) -> Survey:
             if "charge" not in str(refusal):
                 raise
         else:
-            return Survey(path, "", Counter(imported.ledger.sums()))
+            kinds = ((each.deed, each.kind) for each in imported.ledger.entries)
+            return Survey(path, "", Counter(kinds))
     assert error is not None
     raise error
 
 
-def _read(path: Path) -> tuple[SiteMap, ImportOptions]:
-    """Return a map, with the options that it can be read with."""
+def _read(path: Path) -> SiteMap:
+    """Return a map with the options that it can be read with."""
     layers = ("*",) if path.suffix.lower() == ".dxf" else ()
     options = ImportOptions(buildings_from=layers, repair=True)
     try:
-        return read_map(path, options), options
+        return read_map(path, options)
     except BlastEnvError as error:
         if "--units" not in str(error):
             raise
-    options = replace(options, units="m")
-    return read_map(path, options), options
+    return read_map(path, replace(options, units="m"))
 
 
 def _unit_m(site_map: SiteMap) -> float:
     """Return the length of a unit of coordinates, m; degrees are as long as on the equator."""
-    if isinstance(site_map.coordinates, DrawingPlane):
-        return site_map.coordinates.metres_per_unit
-    return _DEGREE_M if site_map.coordinates.crs == "EPSG:4326" else 1.0
+    return _DEGREE_M if site_map.crs == WGS84 else site_map.unit_m
 
 
 def _around(

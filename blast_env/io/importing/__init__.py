@@ -1,4 +1,4 @@
-"""Sites from maps and drawings: GeoJSON, OpenStreetMap, DXF."""
+"""Sites from maps and drawings: GeoJSON, OpenStreetMap, DXF, IFC."""
 
 from typing import TYPE_CHECKING
 

@@ -1,18 +1,19 @@
 """Preparation of a map's buildings: sound outlines, heights, parts, and none above another."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
-from blast_env.io.importing.cells import mended
-from blast_env.io.importing.heights import with_heights
-from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.options import ImportOptions
+from blast_env.io.importing.outlines import mended
 from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
+from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -28,21 +29,53 @@ _LEAST_M2: Final = 1.0
 _PART_SHARE: Final = 0.5
 """Least share of a part that lies in its building."""
 
+_ROOFS: Final = frozenset({"roof", "canopy", "carport"})
+"""Values of `building` for a roof on posts."""
 
-def prepared(site: PlacedSite, options: ImportOptions, ledger: Ledger) -> PlacedSite:
+_ROOF_M: Final = 4.5
+_LEAST_NEIGHBOURS: Final = 3
+_MOST_NEIGHBOURS: Final = 15
+_NEIGHBOUR_M: Final = 150.0
+_SMALL_M2: Final = 30.0
+_LOW_SHARE: Final = 0.25
+
+_STOREYS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
+    {
+        **dict.fromkeys(
+            ("garage", "garages", "shed", "hut", "cabin", "kiosk", "greenhouse", "toilets")
+            + ("bungalow", "static_caravan", "service", "container", "ruins", "farm_auxiliary"),
+            (1, 1),
+        ),
+        **dict.fromkeys(("house", "detached", "semidetached_house", "terrace", "farm"), (2, 1)),
+        **dict.fromkeys(
+            ("apartments", "dormitory", "hotel", "office", "commercial", "hospital", "public")
+            + ("university", "government", "civic", "residential"),
+            (4, 2),
+        ),
+        **dict.fromkeys(("industrial", "warehouse", "hangar", "barn", "church", "chapel"), (3, 2)),
+        **dict.fromkeys(("cathedral", "tower", "water_tower", "silo", "chimney"), (6, 3)),
+    }
+)
+"""Likely and low numbers of storeys by the value of `building` or `man_made`."""
+
+_USUAL: Final = (2, 1)
+_GENERAL: Final = ("", "yes")
+_HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
+
+
+def prepared(site: PlacedSite) -> PlacedSite:
     """Return a site whose buildings have sound outlines and heights, and do not overlap.
 
     Raises:
         BlastEnvError: If an outline is not sound, and may not be or cannot be repaired.
     """
     others = [each for each in site.things if each.role is not Role.BUILDING]
-    buildings = [_sound(site, each, options, ledger) for each in site.of_role(Role.BUILDING)]
-    buildings = _with_parts(buildings, options, ledger)
-    buildings = list(with_heights(buildings, options, ledger))
-    return replace(site, things=(*others, *_apart(buildings, options, ledger)))
+    buildings = [_sound(site, each) for each in site.of_role(Role.BUILDING)]
+    buildings = _with_heights(site, _with_parts(site, buildings))
+    return replace(site, things=(*others, *_apart(site, buildings)))
 
 
-def _sound(site: PlacedSite, thing: Thing, options: ImportOptions, ledger: Ledger) -> Thing:
+def _sound(site: PlacedSite, thing: Thing) -> Thing:
     """Return a building with its outline without self-intersections; a point becomes a circle.
 
     Raises:
@@ -58,15 +91,15 @@ def _sound(site: PlacedSite, thing: Thing, options: ImportOptions, ledger: Ledge
         return thing
     words = f" ({shortened(thing.name)})" if thing.name else ""
     what = f"{site.path}: {thing.place}{words}: the outline"
-    if not options.repair:
+    if not site.options.repair:
         reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()
         raise BlastEnvError(f"{what} is not sound: {reason}; --repair corrects such outlines")
     kind = "outlines that cross themselves, corrected"
-    ledger.add(Deed.GUESSED, kind, thing.place, thing.name)
+    site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name)
     return replace(thing, geometry=mended(thing.geometry, what))
 
 
-def _with_parts(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> list[Thing]:
+def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
     """Return buildings and their parts, joined by `part_of`.
 
     Parts that are small or without a height of their own are not kept; a building without a height
@@ -82,9 +115,9 @@ def _with_parts(things: Sequence[Thing], options: ImportOptions, ledger: Ledger)
         own = _building_of(part, wholes, tree)
         if own is None:
             found.append(replace(part, is_part=False))
-        elif part.height_m is None or part.geometry.area < options.least_area_m2:
+        elif part.height_m is None or part.geometry.area < site.options.least_area_m2:
             kind = "parts of buildings, small or without a height"
-            ledger.add(Deed.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
+            site.ledger.add(Deed.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
         else:
             parts.setdefault(own, []).append(part)
     for index, whole in enumerate(wholes):
@@ -92,9 +125,9 @@ def _with_parts(things: Sequence[Thing], options: ImportOptions, ledger: Ledger)
         lowest_m = min((each.height_m for each in own_parts if each.height_m), default=None)
         if lowest_m is not None and whole.height_m is None:
             kind, detail = "heights of buildings with parts", f"{lowest_m:g} m, as the lowest"
-            ledger.add(Deed.GUESSED, kind, whole.place, whole.name, detail)
+            site.ledger.add(Deed.GUESSED, kind, whole.place, whole.name, detail)
             whole = replace(whole, height_m=lowest_m)
-        group = whole.place if own_parts else ""
+        group = whole.part_of or (whole.place if own_parts else "")
         found.append(replace(whole, part_of=group))
         found += [
             replace(each, part_of=group, protected=whole.protected, name=each.name or whole.name)
@@ -120,7 +153,7 @@ def _common(one: Thing, other: Thing) -> BaseGeometry:
     return shapely.intersection(one.geometry, other.geometry)
 
 
-def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> list[Thing]:
+def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
     """Return buildings without overlaps: the higher one has the ground of both.
 
     A part comes before its building. A higher building that begins above the lower one's base
@@ -136,7 +169,7 @@ def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> l
     for k, thing in enumerate(order):
         shape = thing.geometry
         cut: list[Thing] = []
-        least_m2 = max(options.least_area_m2, _LEAST_SHARE * shape.area)
+        least_m2 = max(site.options.least_area_m2, _LEAST_SHARE * shape.area)
         for index in sorted(int(other) for other in tree.query(shape, "intersects")):
             if cut and shape.area < least_m2:
                 break
@@ -151,7 +184,7 @@ def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> l
                 kind, shape = f"{kind}, covered", shapely.Polygon()
             else:
                 kind = f"{kind}, overlap left out"
-            ledger.add(Deed.MERGED, kind, thing.place, thing.name, detail)
+            site.ledger.add(Deed.MERGED, kind, thing.place, thing.name, detail)
         left[k] = replace(thing, geometry=shape)
     return [*found, *(each for each in left if not each.geometry.is_empty)]
 
@@ -180,3 +213,88 @@ def _areas_of(shape: BaseGeometry) -> BaseGeometry:
     parts = shapely.get_parts(shape)
     areas = parts[shapely.get_dimensions(parts) == 2]
     return areas[0] if len(areas) == 1 else shapely.MultiPolygon(list(np.asarray(areas)))
+
+
+def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:
+    """Return buildings, each with a height; the ledger gets the guesses.
+
+    A height is guessed from the known ones of the nearest buildings of the kind, then from the
+    kind, and from those of all neighbours if the kind says nothing. A roof on posts is open below.
+    """
+    guess = _Guess(buildings, site.options)
+    found = []
+    for thing in buildings:
+        if thing.carries and thing.height_m is None:
+            kind = "terraces without a height, on which nothing stands"
+            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name)
+            thing = replace(thing, carries=False)
+        if thing.height_m is None:
+            height_m, kind, detail = guess.of(thing)
+            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name, detail)
+            thing = replace(thing, height_m=height_m)
+        if thing.kind in _ROOFS and thing.base_m == 0.0 and thing.height_m is not None:
+            base_m = max(thing.height_m - MODULE_SIDE_M, 0.0)
+            kind = "roofs on posts, open below"
+            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name, f"from {base_m:g} m")
+            thing = replace(thing, base_m=base_m)
+        found.append(thing)
+    return found
+
+
+class _Guess:
+    """Guesses heights of buildings.
+
+    Args:
+        buildings: All buildings, in metres.
+        options: Options of the import.
+    """
+
+    def __init__(self, buildings: Sequence[Thing], options: ImportOptions) -> None:
+        self._options = options
+        self._known = [each for each in buildings if each.height_m is not None]
+        self._tree = shapely.STRtree([each.geometry for each in self._known])
+
+    def of(self, thing: Thing) -> tuple[float, str, str]:
+        """Return a height, m, with the kind of the guess and its words."""
+        if self._options.default_height_m is not None:
+            height_m = self._options.default_height_m
+            return height_m, "heights not in the file, --default-height", f"{height_m:g} m"
+        likely_m, low_m, by = next(self._guesses(thing))
+        if self._options.low_heights:
+            return low_m, "heights not in the file, low guess", f"{low_m:.1f} m {by}"
+        return (
+            likely_m,
+            f"heights not in the file ({_HIGH})",
+            (f"{likely_m:.1f} m {by}, low {low_m:.1f} m"),
+        )
+
+    def _guesses(self, thing: Thing) -> Iterator[tuple[float, float, str]]:
+        """Yield likely and low heights, m, and their reason, the best first."""
+        if thing.kind in _ROOFS:
+            yield _ROOF_M, _ROOF_M, "as a roof"
+        level_m = self._options.level_height_m
+        if thing.kind in _GENERAL and thing.geometry.area < _SMALL_M2:
+            yield level_m, level_m, "as a small building"
+        near = self._near(thing)
+        alike = [each.height_m for each in near if each.kind == thing.kind and each.height_m]
+        if len(alike) >= _LEAST_NEIGHBOURS:
+            yield (*_middle(alike), f"as {len(alike)} neighbours")
+        storeys = _STOREYS.get(thing.kind)
+        if storeys is not None:
+            yield storeys[0] * level_m, storeys[1] * level_m, "by its kind"
+        around = [each.height_m for each in near if each.height_m]
+        if len(around) >= _LEAST_NEIGHBOURS:
+            yield (*_middle(around), f"as {len(around)} neighbours")
+        yield _USUAL[0] * level_m, _USUAL[1] * level_m, "as usual"
+
+    def _near(self, thing: Thing) -> list[Thing]:
+        """Return the buildings of known height around one, the nearest first."""
+        around = self._tree.query(thing.geometry, "dwithin", distance=_NEIGHBOUR_M)
+        near = [self._known[index] for index in around]
+        near.sort(key=lambda each: float(each.geometry.distance(thing.geometry)))
+        return near[:_MOST_NEIGHBOURS]
+
+
+def _middle(heights_m: Sequence[float]) -> tuple[float, float]:
+    """Return the median and the lower quartile."""
+    return float(np.median(heights_m)), float(np.quantile(heights_m, _LOW_SHARE))

@@ -1,8 +1,9 @@
-"""Conversion of a map or drawing to a scenario, with a report on the deviations."""
+"""Conversion of a map or drawing to a scenario, or to a sketch of its buildings."""
 
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import cos, radians
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -10,21 +11,19 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.geometry import Rectangle
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
 from blast_env.io.importing.fitting import FittedBuilding, fit_buildings, plain_name
 from blast_env.io.importing.geojson import read_geojson
+from blast_env.io.importing.ground import build_zone, charge_sources
 from blast_env.io.importing.ledger import Deed, Ledger
-from blast_env.io.importing.options import CALIBRATIONS, ImportOptions
+from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite, place_site
-from blast_env.io.importing.protection import protected_as_asked
-from blast_env.io.importing.roles import Selector, Selectors, things_of
-from blast_env.io.importing.site_map import SiteMap
-from blast_env.io.importing.things import Role
-from blast_env.io.importing.threats import charge_sources
-from blast_env.io.importing.zone import build_zone
+from blast_env.io.importing.site_map import SiteMap, check_file
+from blast_env.io.importing.things import Role, things_of
 from blast_env.provenance import package_version
 from blast_env.reading import read_apart
 from blast_env.response.components import catalogue
@@ -35,7 +34,14 @@ from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):
     import shapely
+    from pyproj import CRS
 
+_PRESET: Final = "collisional"
+_CALIBRATION: Final = "collisional_kb"
+"""The parameters of particle engines, and the calibration stored for them."""
+
+_MOST_SKETCHED: Final = 3000
+_SKETCH_DETAIL: Final = 2e-4  # of the map's extent
 _MOST_DESCRIPTION: Final = 2000
 _MOST_TITLE: Final = 100
 _GLASS: Final = "window_annealed_6"
@@ -53,13 +59,16 @@ class ImportedSite:
         scenario: The scenario.
         buildings: Its buildings, with the deviations of their modules from their outlines.
         site: The objects of the map in site metres.
-        ledger: What became of every object of the file.
     """
 
     scenario: Scenario
     buildings: tuple[FittedBuilding, ...]
     site: PlacedSite
-    ledger: Ledger
+
+    @property
+    def ledger(self) -> Ledger:
+        """Fate of every object of the file."""
+        return self.site.ledger
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -118,55 +127,46 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
 
 
 def _imported(path: Path, options: ImportOptions) -> ImportedSite:
-    ledger = Ledger()
     site_map = read_map(path, options)
-    things = things_of(site_map, selectors_of(site_map, options), options, ledger)
-    site = prepared(place_site(site_map, things, options, ledger), options, ledger)
-    fitted, left_out = fit_buildings(site, options, ledger)
-    left_out = (*left_out, *site.faulty)
-    buildings = protected_as_asked(fitted, left_out, site, options, ledger)
-    simulation = SimulationSection(preset=options.preset)
+    site = prepared(place_site(site_map, things_of(site_map)))
+    buildings = fit_buildings(site)
+    simulation = SimulationSection(preset=_PRESET)
     radius_m = simulation.parameters.charge_radius_m
-    sources, streets = charge_sources(site, buildings, radius_m, options, ledger)
-    zone = build_zone(site, buildings, options)
-    used = {
-        **dict.fromkeys(streets, str(Role.CHARGE)),
-        **{each.place: str(Role.BUILDING) for each in buildings},
-        **_others(site, buildings, options, ledger),
-    }
-    ledger.settle((*site_map.features, *site_map.lost), used)
+    sources, streets = charge_sources(site, buildings, radius_m)
+    zone = build_zone(site, buildings)
+    site_map.settle(
+        {
+            **dict.fromkeys(streets, str(Role.CHARGE)),
+            **{each.place: str(Role.BUILDING) for each in buildings},
+            **_others(site, buildings),
+        }
+    )
+    ledger = site_map.ledger
     if options.strict:
         ledger.check_strict(path)
+    notes = ledger.notes_within(MOST_NOTE)[:MOST_NOTES]
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",
-        "description": _description(path, site, buildings, options),
-        "import_notes": [
-            STEERING.sub(" ", each) for each in ledger.notes_within(MOST_NOTE)[:MOST_NOTES]
-        ],
+        "description": _description(site, buildings),
+        "import_notes": [STEERING.sub(" ", each) for each in notes],
         "site": {"width_m": site.size_m[0], "height_m": site.size_m[1]},
         "charge": sources,
         "structures": [part for building in buildings for part in _structures(building, buildings)],
-        "simulation": {"preset": options.preset},
+        "simulation": {"preset": _PRESET},
         "georeference": site.georeference.model_dump(),
+        "calibration": _CALIBRATION,
     }
     if components := _components(buildings):
         document["components"] = components
     if zone is not None:
         document["build_zone"] = zone
-    if options.preset in CALIBRATIONS:
-        document["calibration"] = CALIBRATIONS[options.preset]
-    scenario = Scenario.from_document(document, str(path))
-    return ImportedSite(scenario, buildings, site, ledger)
+    return ImportedSite(Scenario.from_document(document, str(path)), buildings, site)
 
 
-def _others(
-    site: PlacedSite,
-    buildings: tuple[FittedBuilding, ...],
-    options: ImportOptions,
-    ledger: Ledger,
-) -> dict[str, str]:
+def _others(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> dict[str, str]:
     """Return the roles of the outlines and texts that are used, by their places in the file."""
+    options = site.options
     built = shapely.union_all([each.outline for each in buildings])
     used = {}
     for each in site.things:
@@ -181,17 +181,17 @@ def _others(
         if is_used:
             used[each.place] = str(each.role)
         else:
-            ledger.add(Deed.PASSED, why, each.place, each.name)
+            site.ledger.add(Deed.PASSED, why, each.place, each.name)
     return used
 
 
-def _read_ifc(path: Path, options: ImportOptions) -> SiteMap:
+def _read_ifc(site_map: SiteMap) -> None:
     from blast_env.io.importing.ifc import read_ifc  # here, because it needs the extra `ifc`
 
-    return read_ifc(path, options)
+    read_ifc(site_map)
 
 
-_READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = MappingProxyType(
+_READERS: Final[Mapping[str, Callable[[SiteMap], None]]] = MappingProxyType(
     {
         ".geojson": read_geojson,
         ".json": read_geojson,
@@ -203,27 +203,19 @@ _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = Mappin
 
 
 def read_map(path: Path, options: ImportOptions) -> SiteMap:
-    """Return the map of a file, read by its suffix."""
-    name = path.name.lower()
+    """Return the map of a file, read by its suffix.
+
+    Raises:
+        BlastEnvError: If it cannot be read, is too large, or has an unknown suffix.
+    """
+    name, site_map = path.name.lower(), SiteMap(path, options)
     for suffix, reader in _READERS.items():
         if name.endswith(suffix):
-            return reader(path, options)
+            check_file(path)
+            reader(site_map)
+            site_map.check_coordinates()
+            return site_map
     raise BlastEnvError(f"{path}: suffix is {path.suffix!r}, must be one of {', '.join(_READERS)}")
-
-
-def selectors_of(site_map: SiteMap, options: ImportOptions) -> Selectors:
-    """Return the selectors of the user; roles without any follow the usual tags."""
-    chosen = {
-        Role.ZONE: options.zone_from,
-        Role.KEEP_OUT: options.keep_outs_from,
-        Role.CHARGE: options.charges_from,
-        Role.BUILDING: options.buildings_from,
-    }
-    return {
-        role: tuple(Selector.parsed(text, site_map.is_drawing) for text in texts)
-        for role, texts in chosen.items()
-        if texts
-    }
 
 
 def _structures(
@@ -285,23 +277,57 @@ def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
     }
 
 
-def _description(
-    path: Path,
-    site: PlacedSite,
-    buildings: tuple[FittedBuilding, ...],
-    options: ImportOptions,
-) -> str:
+def _description(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
+    digest = hashlib.sha256(site.path.read_bytes()).hexdigest()[:_HASH_DIGITS]
     worst = max(buildings, key=lambda each: each.deviation.area_share)
     farthest = max(buildings, key=lambda each: each.deviation.outline_m)
     protected = ", ".join(each.name for each in buildings if each.protected)
     text = (
-        f"Imported from {path.name} (SHA-256 {digest}...) by blast-env {package_version()}: "
+        f"Imported from {site.path.name} (SHA-256 {digest}...) by blast-env {package_version()}: "
         f"{len(buildings)} buildings, protected: {protected}. The site's x "
         f"axis is turned by {site.rotation_deg:.2f} degrees from the map's. Modules miss at most "
         f"{worst.deviation.area_share:.1%} of a building's area ({worst.name}) and "
         f"{farthest.deviation.outline_m:.2f} m of its outline ({farthest.name}). Charges of "
-        f"{options.tnt_kg:g} kg TNT unless the file says another mass."
+        f"{site.options.tnt_kg:g} kg TNT unless the file says another mass."
     )
     return text[:_MOST_DESCRIPTION]
+
+
+@dataclass(frozen=True)
+class MapSketch:
+    """The outlines of the buildings of a map.
+
+    Attributes:
+        outlines: The corners of each, in the coordinates of the file; the largest first.
+        stretch: Length of a unit along x over that of one along y.
+    """
+
+    outlines: tuple[tuple[PlaceXY, ...], ...]
+    stretch: float
+
+    @property
+    def bounds(self) -> Rectangle:
+        """The rectangle around all outlines."""
+        return Rectangle(*shapely.total_bounds(shapely.multipoints(sum(self.outlines, ()))))
+
+
+def sketch_of(path: Path, options: ImportOptions) -> MapSketch:
+    """Return the outlines of the buildings of a map: the largest, if there are very many.
+
+    Raises:
+        BlastEnvError: If it cannot be read, or has no building.
+    """
+    site_map = read_map(path, options)
+    things = [each for each in things_of(site_map) if each.role is Role.BUILDING]
+    areas = [each.geometry for each in things if not each.fault]
+    parts = [each for each in shapely.get_parts(areas) if each.geom_type == "Polygon"]
+    if not parts:
+        raise BlastEnvError(f"{path}: has no building; define them with --buildings-from")
+    left, bottom, right, top = shapely.total_bounds(parts)
+    parts.sort(key=lambda each: -float(each.area))
+    detail = _SKETCH_DETAIL * max(right - left, top - bottom)
+    rings = [shapely.simplify(each.exterior, detail).coords[:-1] for each in parts[:_MOST_SKETCHED]]
+    is_map = site_map.crs is not None and CRS(site_map.crs).is_geographic
+    stretch = cos(radians(0.5 * (bottom + top))) if is_map else 1.0
+    return MapSketch(tuple(tuple((x, y) for x, y in ring) for ring in rings), stretch)

@@ -11,20 +11,14 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
-from blast_env.io.importing.options import ImportOptions
-from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
+from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
-    MOST_FEATURES,
     MOST_POINTS,
-    LostFeature,
     MapFeature,
-    Remark,
     SiteMap,
-    checked_file,
+    check_count,
     errors_of,
-    too_many,
-    too_many_points,
 )
 
 with import_extra("maps", "maps and drawings"):
@@ -75,60 +69,52 @@ _FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
 _LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not add ever more points
 
 
-def read_dxf(path: Path, options: ImportOptions) -> SiteMap:
-    """Return the content of the model space of a DXF file, blocks expanded.
+def read_dxf(site_map: SiteMap) -> None:
+    """Read the content of the model space of a DXF file into a map, blocks expanded.
 
     Closed lines, hatches and footprints of meshes are outlines, texts are points. All have the tag
     `layer`: entities on layer 0 of a block take that of the insert. Texts have the tag `text`,
     entities with a thickness or an extent in z `height` and `min_height`, m. A damaged file is read
     as far as `ezdxf.recover` can.
 
-    Args:
-        path: The file.
-        options: The unit, one of `UNITS_M`, that of the file unless given; and the reference system
-            of a drawing in metres with a place on the Earth.
+    The unit is that of the options, one of `UNITS_M`, or that of the file. A drawing in metres may
+    have a reference system.
 
     Raises:
         BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
     """
-    lines = checked_file(path).read_bytes().count(b"\n")
-    if lines > MOST_LINES:
-        raise BlastEnvError(f"{path}: has {lines:,} lines, must have at most {MOST_LINES:,}")
-    remarks: list[Remark] = []
+    path, options = site_map.path, site_map.options
+    check_count(path, path.read_bytes().count(b"\n"), MOST_LINES, "lines of text")
     with errors_of("ezdxf", path, "DXF"):
-        document = _document(path, remarks)
-        remarks += _scaled(document)
+        document = _document(site_map)
+        _set_scales(site_map, document)
         _Unfolded(path, document).check()
-        metres = _metres_per_unit(path, document, options.units)
-        found = list(islice(_Drawn(path, document, metres).features(), MOST_FEATURES + 1))
-    if len(found) > MOST_FEATURES:
-        raise too_many(path)
-    lost = tuple(each for each in found if isinstance(each, LostFeature))
-    features = tuple(each for each in found if not isinstance(each, LostFeature))
-    if options.crs is not None and metres != 1.0:
+        site_map.unit_m = _metres_per_unit(path, document, options.units)
+        for feature in _Drawn(site_map, document).features():
+            site_map.add(feature)
+    if options.crs is not None and site_map.unit_m != 1.0:
         raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
-    coordinates = DrawingPlane(metres) if options.crs is None else MapCoordinates(options.crs)
-    return SiteMap(path, coordinates, features, lost, tuple(remarks))
+    site_map.crs = options.crs
 
 
-def _document(path: Path, remarks: list[Remark]) -> Drawing:
+def _document(site_map: SiteMap) -> Drawing:
     """Return the drawing of a file; if it is damaged, as much as can be recovered."""
     try:
-        return readfile(path)
+        return readfile(site_map.path)
     except Exception as error:  # of many types: see `errors_of`
         try:
-            document, auditor = recover.readfile(path)
+            document, auditor = recover.readfile(site_map.path)
         except Exception:
             raise error from None
         kind = "damaged files, recovered as far as possible"
         count = len(auditor.errors) + len(auditor.fixes)
         faults = f"{count} faults mended or skipped" if count else ""
-        remarks.append((kind, path.name, faults))
+        site_map.ledger.add(Deed.GUESSED, kind, site_map.path.name, detail=faults)
         return document
 
 
-def _scaled(document: Drawing) -> Iterator[Remark]:
-    """Set the scales of 0 of inserts to 1, which no block can be drawn with; yield a remark each.
+def _set_scales(site_map: SiteMap, document: Drawing) -> None:
+    """Set the scales of 0 of inserts to 1, which no block can be drawn with.
 
     CAD programs show such inserts with the scale 1.
     """
@@ -137,8 +123,9 @@ def _scaled(document: Drawing) -> Iterator[Remark]:
             for name in ("xscale", "yscale", "zscale"):
                 if insert.dxf.get(name, 1.0) == 0.0:
                     insert.dxf.set(name, 1.0)
+                    kind = "inserts with a scale of 0, taken as 1"
                     place = f"INSERT {insert.dxf.get('handle')}"
-                    yield "inserts with a scale of 0, taken as 1", place, name
+                    site_map.ledger.add(Deed.GUESSED, kind, place, detail=name)
 
 
 @dataclass(frozen=True)
@@ -249,17 +236,13 @@ class _Drawn:
     """The entities of a drawing as features.
 
     Attributes:
-        path: The file.
+        site_map: The map of the drawing.
         document: The drawing.
-        metres: Length of its unit, m.
-        left: Number of points that its lines may still have.
         skipped: Entities that a block has, but ezdxf cannot place, with the reason.
     """
 
-    path: Path
+    site_map: SiteMap
     document: Drawing
-    metres: float
-    left: int = MOST_POINTS
     skipped: list[tuple[DXFEntity, str]] = field(default_factory=list)
 
     def features(self) -> Iterator[MapFeature]:
@@ -277,7 +260,7 @@ class _Drawn:
                 place = f"{part.dxftype()} {entity.dxf.get('handle')}/{number}"
                 kind = f"entities of blocks that cannot be placed ({reason})"
                 layer = str(part.dxf.get("layer", "0"))
-                yield LostFeature(_NOWHERE, {"layer": layer}, place, kind)
+                yield MapFeature(_NOWHERE, {"layer": layer}, place, kind)
             self.skipped.clear()
 
     def _parts(self, entity: DXFEntity, above: str) -> Iterator[tuple[DXFEntity, str]]:
@@ -329,15 +312,15 @@ class _Drawn:
             kind = "references to other files, or to blocks that are not there"
             if not isinstance(entity, Insert):
                 kind = f"entities of the type {entity.dxftype()}"
-            return LostFeature(_NOWHERE, tags, place, kind)
+            return MapFeature(_NOWHERE, tags, place, kind)
         if geometry.is_empty:
-            return LostFeature(_NOWHERE, tags, place, "entities without an extent in plan")
+            return MapFeature(_NOWHERE, tags, place, "entities without an extent in plan")
         thickness = entity.dxf.get("thickness", 0.0) if entity.dxf.is_supported("thickness") else 0
         base, top = heights[0], heights[1] if _is_mesh(entity) else heights[0] + abs(thickness)
         if top > max(base, 0.0):
-            tags["height"] = self.metres * top
+            tags["height"] = self.site_map.unit_m * top
             if base > 0.0:
-                tags["min_height"] = self.metres * base
+                tags["min_height"] = self.site_map.unit_m * base
         return MapFeature(geometry, tags, place)
 
     def _geometry(self, entity: DXFEntity, place: str) -> tuple[BaseGeometry, tuple[float, float]]:
@@ -387,19 +370,17 @@ class _Drawn:
         held = np.array([tuple(point) for point in line.control_vertices()]).reshape(-1, 3)
         self._check(held, place)
         largest = float(np.abs(held).max(initial=0.0))
-        straight = line.flattening(max(_SAG_M / self.metres, _LEAST_SAG * largest))
-        points = np.array([tuple(each) for each in islice(straight, self.left + 1)]).reshape(-1, 3)
-        if len(points) > self.left:
-            raise too_many_points(self.path)
-        self.left -= len(points)
-        return points
+        straight = line.flattening(max(_SAG_M / self.site_map.unit_m, _LEAST_SAG * largest))
+        points = np.array([tuple(each) for each in islice(straight, MOST_POINTS + 1)])
+        check_count(self.site_map.path, self.site_map.points + len(points), MOST_POINTS, "points")
+        return points.reshape(-1, 3)
 
     def _check(self, points: FloatArray, place: str) -> None:
         largest = float(np.abs(points).max(initial=0.0))
         if not largest <= MOST_COORDINATE:
             raise BlastEnvError(
-                f"{self.path}: {place}: has, or its arcs have, the coordinate {largest:g}, "
-                f"must be within {MOST_COORDINATE:g}"
+                f"{self.site_map.path}: {place}: has, or its arcs have, the coordinate "
+                f"{largest:g}, must be within {MOST_COORDINATE:g}"
             )
 
 

@@ -1,18 +1,17 @@
-"""Polygons of a map's buildings on a site."""
+"""The buildings of a site as polygons: their names, deviations and protection."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.geometry import Rectangle
-from blast_env.io.importing.cells import Deviation, check_outlines
-from blast_env.io.importing.ledger import Deed, Ledger
-from blast_env.io.importing.options import ImportOptions
+from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.outlines import check_outlines, walls_of
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.footprint import Footprint, footprint_of
@@ -33,7 +32,40 @@ _JOINED_M: Final = 0.05  # gap between buildings that is closed
 _MUCH_AREA: Final = 0.2
 _FAR_M: Final = 1.0
 _LEAST_PART_M2: Final = 0.5 * MODULE_SIDE_M**2
-_THIN: Final = "buildings below others, or that cover the centre of no module"
+_LINE_STEP_M: Final = 0.1  # sampling step for distances between outlines
+_LINE_POINTS: Final = 50_000
+_MOST_LISTED: Final = 20
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Deviation of modules from an outline.
+
+    Attributes:
+        area_share: Area of the symmetric difference, as a share of the outline's area.
+        outline_m: Hausdorff distance of the two boundaries: the largest distance of a point of
+            one to the nearest point of the other.
+    """
+
+    area_share: float
+    outline_m: float
+
+    @classmethod
+    def between(cls, outline: BaseGeometry, modules: BaseGeometry) -> "Deviation":
+        """Return the deviation of modules from an outline."""
+        area = shapely.area(shapely.symmetric_difference(outline, modules))
+        outline_m = max(_farthest_m(outline, modules), _farthest_m(modules, outline))
+        return cls(float(area / outline.area), outline_m)
+
+
+def _farthest_m(outline: BaseGeometry, other: BaseGeometry) -> float:
+    """Return the largest distance of a point of an outline from another outline."""
+    step_m = max(_LINE_STEP_M, outline.length / _LINE_POINTS)
+    line = shapely.segmentize(outline.boundary, step_m)
+    tree = shapely.STRtree(walls_of(other))
+    points = shapely.points(shapely.get_coordinates(line))
+    _, distances_m = tree.query_nearest(points, return_distance=True, all_matches=False)
+    return float(distances_m.max())
 
 
 @dataclass(frozen=True)
@@ -118,73 +150,95 @@ class FittedBuilding:
         return MODULE_SIDE_M**2 * sum(len(each.cells) for each in self.polygons)
 
 
-def fit_buildings(
-    site: PlacedSite, options: ImportOptions, ledger: Ledger
-) -> tuple[tuple[FittedBuilding, ...], tuple[Thing, ...]]:
-    """Return the buildings of a site as polygons, and those that are left out.
+def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
+    """Return the buildings of a site as polygons, with those protected that are to be.
 
     Raises:
-        BlastEnvError: If there is no building, or there are too many.
+        BlastEnvError: If there is no building, there are too many, one that is to be protected is
+            not on the site, or none is protected.
     """
-    kept, left_out = _kept(site, options, ledger)
+    kept = _kept(site)
     if not kept:
-        raise BlastEnvError(f"{site.path}: there is no building on the site{_hint(site)}")
+        raise _no_building(site)
     kept.sort(key=lambda each: (each.carries, -each.geometry.area))
-    polygons = _polygons(kept)
-    for each, own in zip(kept, polygons, strict=True):
-        if not own:
-            ledger.add(Deed.LEFT_OUT, _THIN, each.place, each.name)
-            left_out.append(replace(each, fault=_THIN))
-    kept = [each for each, own in zip(kept, polygons, strict=True) if own]
-    polygons = [own for own in polygons if own]
-    count = sum(map(len, polygons))
+    fitted = []
+    for each, own in zip(kept, _polygons(kept), strict=True):
+        if own:
+            fitted.append((each, own))
+        else:
+            kind = "buildings below others, or that cover the centre of no module"
+            site.ledger.add(Deed.LEFT_OUT, kind, each.place, each.name)
+    count = sum(len(own) for _, own in fitted)
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} structures, must take")
-    heights = [_height_m(each) for each in kept]
-    titles = [each.name for each in kept]
+    names = _names([each.name for each, _ in fitted])
     buildings = [
-        FittedBuilding(
-            name=name,
-            title=thing.name,
-            place=thing.place,
-            outline=thing.geometry,
-            polygons=own,
-            height_m=height_m,
-            base_m=_base_m(thing, height_m),
-            protected=thing.protected,
-            carries=thing.carries,
-            part_of=thing.part_of,
-            deviation=Deviation.between(thing.geometry, _modules(own)),
-            is_cut=_touches_border(thing.geometry, site),
-            facade=thing.facade,
-        )
-        for name, thing, own, height_m in zip(_names(titles), kept, polygons, heights, strict=True)
+        _fitted(site, name, each, own) for name, (each, own) in zip(names, fitted, strict=True)
     ]
-    _enter_far_off(buildings, ledger)
-    return tuple(buildings), tuple(left_out)
+    return _with_protected(site, buildings)
 
 
-def _kept(
-    site: PlacedSite, options: ImportOptions, ledger: Ledger
-) -> tuple[list[Thing], list[Thing]]:
-    """Return the large enough buildings on the site, cut at its border, and those left out.
+def _fitted(
+    site: PlacedSite, name: str, thing: Thing, polygons: tuple[Footprint, ...]
+) -> FittedBuilding:
+    """Return a building with its heights in whole modules.
+
+    The ledger gets a building that modules cannot show well, such as thin walls.
+    """
+    modules = shapely.union_all([shapely.box(*box) for own in polygons for box in own.boxes_m])
+    off = Deviation.between(thing.geometry, modules)
+    if off.area_share > _MUCH_AREA or off.outline_m > _FAR_M:
+        detail = f"{off.area_share:.1%} of its area, {off.outline_m:.2f} m of its outline"
+        kind = "shapes of buildings that modules miss by much"
+        site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name or name, detail)
+    height_m = None
+    base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
+    if thing.height_m is not None:
+        height_m = max(round(thing.height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
+        base_m = max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
+    return FittedBuilding(
+        name=name,
+        title=thing.name,
+        place=thing.place,
+        outline=thing.geometry,
+        polygons=polygons,
+        height_m=height_m,
+        base_m=base_m,
+        protected=thing.protected,
+        carries=thing.carries,
+        part_of=thing.part_of,
+        deviation=off,
+        is_cut=bool(shapely.intersects(thing.geometry, site.box.boundary)),
+        facade=thing.facade,
+    )
+
+
+def _kept(site: PlacedSite) -> list[Thing]:
+    """Return the large enough buildings on the site, cut at its border.
 
     Raises:
         BlastEnvError: If there are too many buildings, or their outlines are too long.
     """
-    things = site.of_role(Role.BUILDING)
+    things, least_m2 = site.of_role(Role.BUILDING), site.options.least_area_m2
     outlines = np.array([each.geometry for each in things], dtype=object)
     outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
     inside = shapely.intersection(outlines, site.box)
     parts, owner = shapely.get_parts(inside, return_index=True)
     is_area = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
     areas_m2 = np.bincount(owner[is_area], shapely.area(parts[is_area]), len(things))
-    chosen = np.flatnonzero(areas_m2 >= options.least_area_m2)
+    chosen = np.flatnonzero(areas_m2 >= least_m2)
     if len(chosen) > MOST_STRUCTURES:
         raise _too_many(site, f"there are {len(chosen)} buildings on the site, must be")
     geometries = [_together(parts[is_area & (owner == index)]) for index in chosen]
     check_outlines(geometries, f"{site.path}: the buildings")
-    kept = [
+    for thing, shape, area_m2 in zip(things, inside, areas_m2, strict=True):
+        if shape.is_empty:
+            site.ledger.add(Deed.PASSED, OUTSIDE, thing.place, thing.name)
+        elif area_m2 < least_m2:
+            kind = f"buildings of less than {least_m2:g} m2 (--least-area)"
+            detail = f"{area_m2:.1f} m2 on the site"
+            site.ledger.add(Deed.LEFT_OUT, kind, thing.place, thing.name, detail)
+    return [
         replace(
             things[index],
             geometry=geometry,
@@ -192,16 +246,6 @@ def _kept(
         )
         for index, geometry in zip(chosen, geometries, strict=True)
     ]
-    left_out = []
-    for thing, shape, area_m2 in zip(things, inside, areas_m2, strict=True):
-        if shape.is_empty:
-            ledger.add(Deed.PASSED, OUTSIDE, thing.place, thing.name)
-        elif area_m2 < options.least_area_m2:
-            kind = f"buildings of less than {options.least_area_m2:g} m2 (--least-area)"
-            detail = f"{area_m2:.1f} m2 on the site"
-            ledger.add(Deed.LEFT_OUT, kind, thing.place, thing.name, detail)
-            left_out.append(replace(thing, fault=kind))
-    return kept, left_out
 
 
 def _together(parts: NDArray[np.object_]) -> BaseGeometry:
@@ -280,38 +324,6 @@ def _overlap(buildings: Iterable[Sequence[Footprint]]) -> bool:
     return bool(area_m2 > shapely.area(shapely.union_all(boxes)) + 0.5 * MODULE_SIDE_M**2)
 
 
-def _modules(polygons: Sequence[Footprint]) -> BaseGeometry:
-    """Return the outline of the modules of polygons in site metres."""
-    return shapely.union_all([shapely.box(*box) for each in polygons for box in each.boxes_m])
-
-
-def _enter_far_off(buildings: Iterable[FittedBuilding], ledger: Ledger) -> None:
-    """Enter in the ledger the buildings that modules cannot show well, such as thin walls."""
-    for each in buildings:
-        own = each.deviation
-        if own.area_share > _MUCH_AREA or own.outline_m > _FAR_M:
-            detail = f"{own.area_share:.1%} of its area, {own.outline_m:.2f} m of its outline"
-            kind = "shapes of buildings that modules miss by much"
-            ledger.add(Deed.GUESSED, kind, each.place, each.title or each.name, detail)
-
-
-def _height_m(thing: Thing) -> float | None:
-    """Return the height of a building, m, in whole modules; `None` if it is unknown."""
-    if thing.height_m is None:
-        return None
-    return max(round(thing.height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
-
-
-def _base_m(thing: Thing, height_m: float | None) -> float:
-    """Return the base of a building, m, in whole modules, at least one module below its top."""
-    base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
-    return base_m if height_m is None else max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
-
-
-def _touches_border(outline: BaseGeometry, site: PlacedSite) -> bool:
-    return bool(shapely.intersects(outline, site.box.boundary))
-
-
 def _names(titles: Sequence[str]) -> list[str]:
     """Return a valid and unique name for each building."""
     names: list[str] = []
@@ -344,16 +356,92 @@ def _letters(number: int) -> str:
     return text
 
 
-def _hint(site: PlacedSite) -> str:
-    """Return advice for a site without buildings."""
-    return "".join(_hints(site))
-
-
-def _hints(site: PlacedSite) -> Iterator[str]:
+def _no_building(site: PlacedSite) -> BlastEnvError:
+    """Return the error of a site without buildings."""
+    hint = ": the file has none; define them with --buildings-from"
     if site.layers:
-        layers = ", ".join(site.layers[:20])
-        yield f": name their layer with --buildings-from; the file has {layers}"
+        layers = ", ".join(site.layers[:_MOST_LISTED])
+        hint = f": name their layer with --buildings-from; the file has {layers}"
     elif site.of_role(Role.BUILDING):
-        yield ": buildings of the file lie elsewhere, or are smaller than --least-area"
-    else:
-        yield ": the file has none; define them with --buildings-from"
+        hint = ": buildings of the file lie elsewhere, or are smaller than --least-area"
+    return BlastEnvError(f"{site.path}: there is no building on the site{hint}")
+
+
+def _with_protected(
+    site: PlacedSite, buildings: Sequence[FittedBuilding]
+) -> tuple[FittedBuilding, ...]:
+    """Return the buildings, with those protected that the user named, or else the file marks.
+
+    All parts of a building are protected with it.
+
+    Raises:
+        BlastEnvError: If there is no building of a name, the place is outside the site, the
+            building asked for is left out, or no building is protected.
+    """
+    chosen = {_named(site, buildings, name) for name in site.options.protect}
+    if site.options.protect_near is not None:
+        chosen.add(_nearest(site, buildings, site.options.protect_near))
+    if not chosen:
+        chosen = {index for index, each in enumerate(buildings) if each.protected}
+    if not chosen:
+        raise BlastEnvError(
+            "no building is protected: say --protect NAME or --protect-near X,Y; there are "
+            f"{_listed(buildings)}"
+        )
+    groups = {buildings[index].group for index in chosen}
+    return tuple(replace(each, protected=each.group in groups) for each in buildings)
+
+
+def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> int:
+    """Return the index of the building of a name, the scenario's or the map's."""
+    asked = name.casefold()
+    for key in ("name", "title"):
+        for index, each in enumerate(buildings):
+            if getattr(each, key).casefold() == asked:
+                return index
+    for lost in site.ledger.of(Deed.LEFT_OUT):
+        if lost.name.casefold() == asked:
+            raise BlastEnvError(
+                f"--protect is {name!r}, which is left out: {lost.place}: {lost.kind}"
+            )
+    raise BlastEnvError(f"--protect is {name!r}, but there are {_listed(buildings)}")
+
+
+def _nearest(
+    site: PlacedSite, buildings: Sequence[FittedBuilding], place: tuple[float, float]
+) -> int:
+    """Return the index of the building nearest to a place of the map."""
+    x_m, y_m = site.to_site(np.array([place]))[0]
+    point = shapely.Point(x_m, y_m)
+    distances_m = [each.outline.distance(point) for each in buildings]
+    best, known = int(np.argmin(distances_m)), {each.place for each in buildings}
+    reasons = {each.place: each.kind for each in site.ledger.of(Deed.LEFT_OUT)}
+    reasons = {key: reason for key, reason in reasons.items() if key not in known}
+    for each in (*site.of_role(Role.BUILDING), *site.faulty):
+        if each.place not in reasons or each.role is not Role.BUILDING or each.geometry.is_empty:
+            continue
+        if each.geometry.convex_hull.distance(point) < distances_m[best]:
+            words = f" ({shortened(each.name)})" if each.name else ""
+            raise BlastEnvError(
+                f"--protect-near is {place[0]:.10g},{place[1]:.10g}: the building nearest to it "
+                f"is {each.place}{words}, which is left out: {reasons[each.place]}"
+            )
+    if not shapely.intersects(point, site.box):
+        raise BlastEnvError(
+            f"--protect-near is {place[0]:.10g},{place[1]:.10g}, which is at ({x_m:,.1f}, "
+            f"{y_m:,.1f}) m of the site, outside of it{site.hint_of_exchange(place)}"
+        )
+    return best
+
+
+def _listed(buildings: Sequence[FittedBuilding]) -> str:
+    """Return the names of some buildings, those with names on the map first."""
+    titled = sorted(buildings, key=lambda each: not each.title)
+    shown = [
+        each.name
+        if "_".join(each.title.split()) in ("", each.name)
+        else f"{each.name} ({each.title})"
+        for each in titled[:_MOST_LISTED]
+    ]
+    more = len(buildings) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")

@@ -6,21 +6,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
-from blast_env.io.importing.options import ImportOptions
-from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.site_map import (
-    MOST_FEATURES,
-    LostFeature,
+    WGS84,
     MapFeature,
     SiteMap,
     Tags,
-    checked_file,
-    too_many,
+    check_count,
+    errors_of,
 )
 
 with import_extra("maps", "maps and drawings"):
     import shapely
-    from shapely.errors import ShapelyError
     from shapely.geometry import shape
     from shapely.geometry.base import BaseGeometry
 
@@ -30,7 +26,6 @@ MOST_VALUES: Final = 3_000_000
 LOCAL: Final = "local"
 """Reference system of coordinates in metres without a place on the Earth."""
 
-_DEFAULT_CRS: Final = "EPSG:4326"
 _LOCAL_WORDS: Final = "local site metres"  # in exports of a site without a georeference
 _KINDS: Final = (
     *("Point", "MultiPoint", "LineString", "MultiLineString"),
@@ -38,44 +33,32 @@ _KINDS: Final = (
 )
 
 
-def read_geojson(path: Path, options: ImportOptions) -> SiteMap:
-    """Return the map of a GeoJSON file.
+def read_geojson(site_map: SiteMap) -> None:
+    """Read a GeoJSON file into a map.
 
-    Args:
-        path: The file.
-        options: The reference system of the coordinates, `local` for metres without a place on the
-            Earth; that of the file unless given, or longitude and latitude (EPSG:4326) if it has
-            none.
+    Its coordinates are in the reference system of the options, `local` for metres without a place
+    on the Earth; that of the file unless given, or longitude and latitude (EPSG:4326) if it has
+    none.
 
     Raises:
         BlastEnvError: If it cannot be read, or is not GeoJSON.
     """
+    path, options = site_map.path, site_map.options
     options.refuse("GeoJSON, whose coordinates --crs is about", "units")
-    document = _parsed(checked_file(path))
+    document = _parsed(path)
     listed = _listed_features(path, document)
-    if len(listed) > MOST_FEATURES:
-        raise too_many(path)
-    features, lost = [], []
     for index in range(len(listed)):
         item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
-        feature = _feature(path, f"features[{index}]", item)
-        if isinstance(feature, LostFeature):
-            lost.append(feature)
-        else:
-            features.append(feature)
-    coordinates = _coordinates(path, document, options.crs)
-    return SiteMap(path, coordinates, tuple(features), tuple(lost))
+        site_map.add(_feature(path, f"features[{index}]", item))
+    crs = _crs(path, document) if options.crs is None else options.crs
+    site_map.crs = None if crs == LOCAL else crs
 
 
 def _parsed(path: Path) -> Mapping[str, Any]:
     try:
         content = path.read_bytes()
         values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
-        if values > MOST_VALUES:
-            raise BlastEnvError(
-                f"{path}: has {values:,} commas and opening brackets, must have at most "
-                f"{MOST_VALUES:,}: cut a smaller extract"
-            )
+        check_count(path, values, MOST_VALUES, "commas and opening brackets")
         document = json.loads(content)
     except RecursionError as error:
         raise BlastEnvError(f"{path}: is nested too deeply") from error
@@ -114,7 +97,7 @@ def _feature(path: Path, place: str, item: Any) -> MapFeature:
     given = item.get("geometry")
     geometry = shapely.Point() if given is None else _geometry(path, place, given)
     if geometry.is_empty:
-        return LostFeature(geometry, _tags(item), place, "features without a geometry")
+        return MapFeature(geometry, _tags(item), place, "features without a geometry")
     return MapFeature(geometry, _tags(item), place)
 
 
@@ -125,22 +108,8 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
             f"{path}: {place}.geometry: type is {value_text(kind)}, must be one of "
             f"{', '.join(_KINDS)}"
         )
-    try:
-        geometry = shapely.force_2d(shape(document))
-    except (
-        ShapelyError,
-        TypeError,
-        ValueError,
-        ArithmeticError,
-        LookupError,
-        AttributeError,
-    ) as error:
-        raise BlastEnvError(
-            f"{path}: {place}.geometry: is not usable: {shortened(str(error), 300)}"
-        ) from error
-    except RecursionError as error:
-        raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
-    return geometry
+    with errors_of("shapely", f"{path}: {place}.geometry", "a geometry"):
+        return shapely.force_2d(shape(document))
 
 
 def _tags(item: Mapping[str, Any]) -> Tags:
@@ -152,21 +121,16 @@ def _tags(item: Mapping[str, Any]) -> Tags:
     return {str(key): value for key, value in tags.items() if isinstance(value, str | int | float)}
 
 
-def _coordinates(
-    path: Path, document: Mapping[str, Any], crs: str | None
-) -> MapCoordinates | DrawingPlane:
-    """Return the coordinates' system: the one given, or that of the file."""
-    if crs is None:
-        if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
-            return DrawingPlane(1.0)
-        crs = _named_crs(path, document.get("crs"))
-    return DrawingPlane(1.0) if crs == LOCAL else MapCoordinates(crs)
+def _crs(path: Path, document: Mapping[str, Any]) -> str:
+    """Return the reference system of a file: that of the older form of GeoJSON, or the usual one.
 
-
-def _named_crs(path: Path, member: Any) -> str:
-    """Return the reference system of the older form of GeoJSON."""
+    Exports of a site without a place on the Earth are `local`.
+    """
+    if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
+        return LOCAL
+    member = document.get("crs")
     if member is None:
-        return _DEFAULT_CRS
+        return WGS84
     properties = member.get("properties") if isinstance(member, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
     if not isinstance(name, str):

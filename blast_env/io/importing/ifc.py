@@ -3,24 +3,19 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.io.importing.options import ImportOptions
-from blast_env.io.importing.plane import DrawingPlane
+from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
-    LostFeature,
     MapFeature,
-    Remark,
     SiteMap,
-    checked_file,
+    check_count,
     errors_of,
-    too_many,
 )
 
 with import_extra("ifc", "building models"):
@@ -33,7 +28,7 @@ with import_extra("maps", "maps and drawings"):
     import shapely
     from shapely.geometry.base import BaseGeometry
 
-_USED: Final = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate")
+_SHAPED: Final = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate", "IfcWindow")
 _GAP_M: Final = 0.3
 """Gap between walls and slabs that is closed."""
 
@@ -61,55 +56,49 @@ class _Solid:
     high_m: float
 
 
-def read_ifc(path: Path, options: ImportOptions) -> SiteMap:
-    """Return the buildings of an IFC model, in metres, each with its height, storeys and windows.
+def read_ifc(site_map: SiteMap) -> None:
+    """Read the buildings of an IFC model, in metres, each with its height, storeys and windows.
 
     A building is what its walls, slabs and roofs cover. Everything else is on the ledger.
 
     Raises:
         BlastEnvError: If the file cannot be read, states no unit of length, or has no building.
     """
+    path, options, ledger = site_map.path, site_map.options, site_map.ledger
     options.refuse("IFC, which states its unit", "units")
     options.refuse("IFC, which is in metres of its own", "crs")
-    checked_file(path)
     with errors_of("ifcopenshell", path, "IFC"):
         model = ifcopenshell.open(str(path))
         lengths = [each for each in model.by_type("IfcNamedUnit") if each.UnitType == "LENGTHUNIT"]
         if not lengths:
             raise BlastEnvError(f"{path}: states no unit of length, must state one")
         products = [each for each in model.by_type("IfcElement") if each.Representation]
-        if len(products) > MOST_FEATURES:
-            raise too_many(path)
+        check_count(path, len(products), MOST_FEATURES, "outlines and lines")
         buildings = model.by_type("IfcBuilding")
         if not buildings:
             raise BlastEnvError(f"{path}: has no IfcBuilding")
-        chosen = [each for each in products if any(map(each.is_a, (*_USED, "IfcWindow")))]
+        chosen = [each for each in products if any(map(each.is_a, _SHAPED))]
         solids = {each.element.id(): each for each in _solids(model, chosen)}
         owners = {each.id(): _building_of(each, buildings) for each in chosen}
-        features, merged, remarks = [], list[Remark](), list[Remark]()
         for building in buildings:
             own = [each for key, each in solids.items() if owners[key] == building]
             found = _building(model, building, own)
-            if found is not None:
-                features.append(found)
-                merged += [
-                    ("parts of a building", _place(each.element), f"of {found.place}")
-                    for each in own
-                ]
-                if "facade:width" in found.tags:
-                    remarks.append(
-                        ("glass, which IFC does not state", found.place, "annealed 6 mm")
-                    )
-    others = [each for each in products if each.id() not in solids]
-    lost = tuple(
-        LostFeature(_NOWHERE, {each.is_a(): True, "building": "part"}, _place(each), _reason(each))
-        for each in others
-    )
-    return SiteMap(path, DrawingPlane(1.0), tuple(features), lost, tuple(remarks), tuple(merged))
+            if found is None:
+                continue
+            site_map.add(found)
+            for each in own:
+                detail = f"of {found.place}"
+                ledger.add(Deed.MERGED, "parts of a building", _place(each.element), detail=detail)
+            if "facade:width" in found.tags:
+                ledger.add(Deed.GUESSED, _GLASS, found.place, detail="annealed 6 mm")
+    for each in products:
+        if each.id() not in solids:
+            tags: dict[str, str | float | bool] = {each.is_a(): True, "building": "part"}
+            site_map.add(MapFeature(_NOWHERE, tags, _place(each), _reason(each)))
 
 
 def _reason(element: Any) -> str:
-    is_used = any(map(element.is_a, (*_USED, "IfcWindow")))
+    is_used = any(map(element.is_a, _SHAPED))
     return f"{element.is_a()} {'without a shape' if is_used else 'of buildings'}"
 
 

@@ -1,23 +1,18 @@
 """The ledger of an import: what became of every object of a map or drawing."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.errors import BlastEnvError, shortened
 from blast_env.files import write_atomically
-from blast_env.io.importing.site_map import MapFeature
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
 
 _MOST_PLACES: Final = 5
 _MOST_CUT_LINES: Final = 12
 _MOST_NAMED: Final = 50
-_UNUSED: Final = "objects of no use to the site"
 
 
 class Deed(StrEnum):
@@ -37,7 +32,7 @@ _SHOWN: Final = (Deed.MERGED, Deed.CLOSED, Deed.GUESSED, Deed.LEFT_OUT)
 STRICT: Final = (Deed.GUESSED, Deed.LEFT_OUT)
 """The deeds that `--strict` refuses."""
 
-_FATES: Final = (Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+FATES: Final = (Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
 """The deeds that say where an object is; a guess is in addition to them."""
 
 
@@ -88,10 +83,6 @@ class Ledger:
         """Return the entries of some deeds."""
         return tuple(each for each in self.entries if each.deed in deeds)
 
-    def sums(self, *deeds: Deed) -> dict[tuple[Deed, str], int]:
-        """Return the number of entries by deed and kind, in the order of the deeds."""
-        return {key: len(entries) for key, entries in self._grouped(deeds or tuple(Deed)).items()}
-
     def save(self, path: Path) -> Path:
         """Write all entries as JSON, or as text for other suffixes; return the path.
 
@@ -138,34 +129,6 @@ class Ledger:
                 for each in entries
             ]
         return record
-
-    def settle(self, features: Iterable[MapFeature], used: Mapping[str, str]) -> None:
-        """Complete the ledger, so that it has every object of the file; no guess about others.
-
-        Args:
-            features: All objects of the file, also those that could not be read whole.
-            used: The kinds of those used on the site, by their places in the file.
-        """
-        known = list(features)
-        bounds = shapely.bounds([each.geometry for each in known]).reshape(-1, 4)
-        middles = 0.5 * (bounds[:, :2] + bounds[:, 2:])
-        positions = {
-            each.place: (float(x), float(y))
-            for each, (x, y) in zip(known, middles, strict=True)
-            if x == x
-        }
-        fates = {each.place for each in self.of(*_FATES)}
-        for each in known:
-            if each.place in used:
-                self.add(Deed.READ, used[each.place], each.place)
-            elif each.place not in fates:
-                self.add(Deed.LEFT_OUT, _UNUSED, each.place)
-        elsewhere = {each.place for each in self.of(Deed.PASSED)}
-        self.entries = [
-            replace(each, position=positions.get(each.place))
-            for each in self.entries
-            if each.deed is not Deed.GUESSED or each.place not in elsewhere
-        ]
 
     def check_strict(self, path: object) -> None:
         """Refuse an import that guessed something or left something out.

@@ -5,19 +5,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.units import MODULE_SIDE_M
 
 PlaceXY = tuple[float, float]
-
-CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "ballistic": "ballistic_kb_100kg",
-        "collisional": "collisional_kb",
-        "collisional_fine": "collisional_fine_kb",
-    }
-)
-"""The stored calibration of each preset of the particle model."""
 
 MOST_SITE_M: Final = 2000.0
 """Longest side of a site in a scenario file, m."""
@@ -38,7 +29,6 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
         "level_height_m": (1.0, 100.0),
         "least_area_m2": (MODULE_SIDE_M**2, 1e6),
         "tnt_kg": (0.01, 100_000.0),
-        "clearance_m": (0.0, MOST_SITE_M),
     }
 )
 
@@ -71,8 +61,6 @@ class ImportOptions:
         zone_around_m: Width of a zone around the protected buildings.
         stock: Modules that there are to place.
         wall_height_m: Height of the modules.
-        clearance_m: Least distance of modules from structures.
-        preset: Parameters of the particle model.
         height_from: Property with the height.
         default_height_m: Height of buildings without one; guessed from neighbours and kind.
         low_heights: Take the low guess of heights that the file does not have.
@@ -105,8 +93,6 @@ class ImportOptions:
     zone_around_m: float | None = None
     stock: int = 20
     wall_height_m: float = 3.0
-    clearance_m: float = 1.0
-    preset: str = "collisional"
     height_from: str | None = None
     default_height_m: float | None = None
     low_heights: bool = False
@@ -121,8 +107,6 @@ class ImportOptions:
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise BlastEnvError(f"{_option(name)} is {value:g}, must be {low:g} to {high:g}")
-        if self.preset not in CALIBRATIONS:
-            raise UnknownNameError("preset", self.preset, CALIBRATIONS)
         for side_m in self.size_m or ():
             if not 2.0 <= side_m <= MOST_SITE_M:
                 raise BlastEnvError(f"--size is {side_m:g}, must be 2 to {MOST_SITE_M:g} m")
@@ -157,8 +141,3 @@ def _option(name: str) -> str:
 def _refuse_both(one: str, value: object, other: str, other_value: object) -> None:
     if value is not None and other_value is not None:
         raise BlastEnvError(f"{one} and {other} exclude each other")
-
-
-def plain(title: str) -> str:
-    """Return a title with `_` for spaces, as in the names of a scenario."""
-    return "_".join(title.split())

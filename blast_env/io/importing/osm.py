@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from math import isclose
 from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any, Final
@@ -13,27 +14,22 @@ from xml.parsers import expat
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
-from blast_env.io.importing.options import ImportOptions
-from blast_env.io.importing.plane import MapCoordinates
+from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.site_map import (
-    MOST_FEATURES,
     MOST_POINTS,
-    LostFeature,
+    WGS84,
     MapFeature,
-    Remark,
     SiteMap,
     Tags,
-    checked_file,
+    check_count,
     errors_of,
-    too_many,
-    too_many_points,
 )
 
 with import_extra("maps", "maps and drawings"):
     import osmium
     import shapely
     from osmium import osm
-    from shapely.geometry import LineString, MultiLineString, Point, Polygon
+    from shapely.geometry import LineString, Point, Polygon
     from shapely.geometry.base import BaseGeometry
 
 SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
@@ -45,7 +41,6 @@ _PACKED: Final[Mapping[str, Callable[[Path, str], Any]]] = MappingProxyType(
     {".gz": gzip.open, ".bz2": bz2.open}
 )
 _PART_BYTES: Final = 2**20
-_WGS84: Final = "EPSG:4326"
 _LEAST_RING: Final = 4  # points, the first one again at the end
 _AREAS: Final = ("multipolygon", "boundary")
 """The types of relations that are outlines."""
@@ -61,8 +56,8 @@ OPEN: Final = "relations with rings that do not close"
 TOUCHING: Final = "relations with rings that touch or cross, put together from their ways"
 
 
-def read_osm(path: Path, options: ImportOptions) -> SiteMap:
-    """Return the map of an OpenStreetMap extract: tagged ways, areas and nodes, in any order.
+def read_osm(site_map: SiteMap) -> None:
+    """Read an OpenStreetMap extract into a map: tagged ways, areas and nodes, in any order.
 
     Closed ways without `highway` and multipolygon relations are outlines. Objects that JOSM has
     marked as deleted are not read.
@@ -70,15 +65,11 @@ def read_osm(path: Path, options: ImportOptions) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read, or options do not fit.
     """
+    options, path = site_map.options, site_map.path
     options.refuse("OpenStreetMap, which is in longitude and latitude", "units", "crs")
-    with (
-        _unpacked(checked_file(path)) as plain,
-        errors_of("osmium", path, "OpenStreetMap data"),
-    ):
-        found = _Found(path, _deleted(plain))
-        found.read(plain)
-    lost, remarks = tuple(found.lost), tuple(found.remarks)
-    return SiteMap(path, MapCoordinates(_WGS84), tuple(found.features), lost, remarks)
+    site_map.crs = WGS84
+    with _unpacked(path) as plain, errors_of("osmium", path, "OpenStreetMap data"):
+        _Extract(site_map, _deleted(plain)).read(plain)
 
 
 @contextmanager
@@ -135,26 +126,18 @@ def _deleted(path: Path) -> set[tuple[str, int]]:
 
 
 @dataclass
-class _Found:
-    """The objects of a file.
+class _Extract:
+    """The objects of an extract.
 
     Attributes:
-        path: The file, for errors.
+        site_map: The map to which they are added.
         deleted: Kinds and ids of the objects that are marked as deleted.
-        features: Those that are usable.
-        lost: The others.
-        remarks: What was mended.
         lines: Known part of each way, by id.
-        left: Number of points that the outlines and lines may still have.
     """
 
-    path: Path
+    site_map: SiteMap
     deleted: set[tuple[str, int]]
-    features: list[MapFeature] = field(default_factory=list)
-    lost: list[LostFeature] = field(default_factory=list)
-    remarks: list[Remark] = field(default_factory=list)
     lines: dict[int, Places] = field(default_factory=dict)
-    left: int = MOST_POINTS
 
     def read(self, plain: Path) -> None:
         """Collect the objects with tags of the unpacked file, which may be in any order."""
@@ -172,8 +155,7 @@ class _Found:
             elif tags:
                 members = [each.ref for each in item.members if each.type == "w"]
                 relations[item.id] = tags, members
-            if points > MOST_POINTS:
-                raise too_many_points(self.path)
+            check_count(self.site_map.path, points, MOST_POINTS, "points")
         places = self._nodes(plain, {node for _, nodes in ways.values() for node in nodes})
         for number in sorted(ways, key=_by_age):
             self._way(number, *ways[number], places)
@@ -193,7 +175,7 @@ class _Found:
                     point = Point(node.lon, node.lat)
                     tagged[node.id] = MapFeature(point, tags, f"node {node.id}")
         for number in sorted(tagged, key=_by_age):
-            self._add(tagged[number])
+            self.site_map.add(tagged[number])
         return places
 
     def _way(
@@ -201,62 +183,38 @@ class _Found:
     ) -> None:
         """Collect a way as an outline if it is closed and not a street, otherwise as a line."""
         places = self.lines[number] = [known[node] for node in nodes if node in known]
-        place = f"way {number}"
-        if tags and (len(places) < len(nodes) or len(places) < 2):
-            reason = SHORT if len(nodes) < 2 else CUT
-            self.lost.append(LostFeature(_line(places), tags, place, reason))
-        elif tags:
-            is_area = nodes[0] == nodes[-1] and len(places) >= _LEAST_RING
-            is_area = is_area and "highway" not in tags
-            geometry = Polygon(places) if is_area else LineString(places)
-            self._add(MapFeature(geometry, tags, place))
+        if not tags:
+            return
+        geometry, fault = _line(places), ""
+        if len(places) < len(nodes) or len(places) < 2:
+            fault = SHORT if len(nodes) < 2 else CUT
+        elif nodes[0] == nodes[-1] and len(places) >= _LEAST_RING and "highway" not in tags:
+            geometry = Polygon(places)
+        self.site_map.add(MapFeature(geometry, tags, f"way {number}", fault))
 
     def _relation(self, place: str, tags: Tags, ways: list[int]) -> None:
-        """Collect a relation, if its ways give an outline."""
-        lines = [self.lines[each] for each in ways if len(self.lines.get(each, ())) > 1]
-        known = MultiLineString(lines)
+        """Collect a relation, as an outline if its ways give one."""
+        lines = [LineString(self.lines[each]) for each in ways if len(self.lines.get(each, ())) > 1]
+        geometry: BaseGeometry = shapely.MultiLineString(lines)
+        fault = ""
         if tags.get("type") not in _AREAS:
-            self.lost.append(LostFeature(known, tags, place, "relations that are no outlines"))
-            return
-        if any(each not in self.lines for each in ways):
-            self.lost.append(LostFeature(known, tags, place, INCOMPLETE))
-            return
-        faces, *rest = shapely.polygonize_full([LineString(line) for line in lines])
-        rings = shapely.get_exterior_ring(shapely.get_parts(faces))
-        geometry: BaseGeometry = Polygon()
-        for ring in rings:
-            geometry = shapely.symmetric_difference(geometry, Polygon(ring))
-        if geometry.area == 0.0:
-            self.lost.append(LostFeature(known, tags, place, OPEN))
-            return
-        if MultiLineString(list(rings)).is_simple and all(each.is_empty for each in rest):
-            geometry = _ordered(geometry)
+            fault = "relations that are no outlines"
+        elif any(each not in self.lines for each in ways):
+            fault = INCOMPLETE
         else:
-            self.remarks.append((TOUCHING, place, ""))
-        self._add(MapFeature(geometry, tags, place))
-
-    def _add(self, feature: MapFeature) -> None:
-        self.left -= int(shapely.get_num_coordinates(feature.geometry))
-        self.features.append(feature)
-        if len(self.features) > MOST_FEATURES:
-            raise too_many(self.path)
-        if self.left < 0:
-            raise too_many_points(self.path)
+            area = shapely.build_area(shapely.GeometryCollection(lines))
+            if area.is_empty:
+                fault = OPEN
+            elif not area.is_valid or not isclose(area.length, geometry.length):
+                self.site_map.ledger.add(Deed.GUESSED, TOUCHING, place)
+            geometry = geometry if area.is_empty else _sound(area)
+        self.site_map.add(MapFeature(geometry, tags, place, fault))
 
 
-def _ordered(area: BaseGeometry) -> BaseGeometry:
-    """Return an area with its rings from the left, outer ones counterclockwise."""
-
-    def start(ring: Any) -> tuple[float, float]:
-        x, y = ring.coords[0]
-        return x, y
-
-    parts = shapely.get_parts(shapely.reverse(shapely.normalize(area)))
-    polygons = [
-        Polygon(each.exterior, sorted(each.interiors, key=start))
-        for each in sorted(parts, key=lambda each: start(each.exterior))
-    ]
-    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+def _sound(area: BaseGeometry) -> BaseGeometry:
+    """Return an area without the ground of the holes that touch its border or each other."""
+    valid = shapely.make_valid(area, method="structure", keep_collapsed=False)
+    return shapely.normalize(valid)
 
 
 def _by_age(number: int) -> tuple[bool, int]:

@@ -14,7 +14,6 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.io.importing.cells import edges_of
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.options import (
@@ -23,6 +22,7 @@ from blast_env.io.importing.options import (
     MOST_SITE_M,
     ImportOptions,
 )
+from blast_env.io.importing.outlines import edges_of
 from blast_env.io.importing.plane import Plane, plane_around, rotated
 from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
@@ -99,7 +99,6 @@ def _densest(values: FloatArray, weights: FloatArray, period: float, near: float
 
 OUTSIDE: Final = "outside the site"
 _EXCHANGED: Final = ": are longitude and latitude exchanged?"
-_HAIR_M: Final = 0.01
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 _WIDER: Final = "ground around buildings, widened to the nearest street"
 _LEAST_STREET_M: Final = 1.0
@@ -112,6 +111,8 @@ class PlacedSite:
 
     Attributes:
         path: The file.
+        options: Options of the import.
+        ledger: The ledger of the import.
         plane: The plane in which the map is measured.
         rotation_deg: From the plane's x axis to the site's, counterclockwise.
         corner_m: The site's lower left corner in the turned plane.
@@ -122,6 +123,8 @@ class PlacedSite:
     """
 
     path: Path
+    options: ImportOptions
+    ledger: Ledger
     plane: Plane
     rotation_deg: float
     corner_m: tuple[float, float]
@@ -161,9 +164,7 @@ class PlacedSite:
         return np.asarray(turned - np.array(self.corner_m))
 
 
-def place_site(
-    site_map: SiteMap, things: Sequence[Thing], options: ImportOptions, ledger: Ledger
-) -> PlacedSite:
+def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
     """Return the site that the options specify, or one around all objects of the map.
 
     Lines that close become outlines. The ledger gets the objects that are elsewhere or cannot be
@@ -173,98 +174,60 @@ def place_site(
         BlastEnvError: If the map has no objects, the place is not on the Earth, or the site would
             be too large.
     """
+    options, ledger = site_map.options, site_map.ledger
     faulty = [each for each in things if each.fault]
     things = [each for each in things if not each.fault]
     if not things:
-        raise _nothing(site_map, faulty, options)
-    plane = plane_around(site_map.coordinates, _reference(things, options))
-    near = _near(site_map, things, plane, options, ledger)
-    if not near:
-        raise _elsewhere(site_map, things, options)
-    near = closed(near, ledger)
-    if site_map.is_drawing:
+        raise _nothing(site_map, faulty)
+    plane = plane_around(site_map.crs, site_map.unit_m, _reference(things, options))
+    near = closed(_near(site_map, things, plane), ledger)
+    if site_map.has_layers:
         near = with_courtyards(near, ledger)
     open_lines = [each for each in near if each.fault]
     near = [each for each in near if not each.fault]
     if not near or (options.size_m is None and Role.BUILDING not in {each.role for each in near}):
-        raise _nothing(site_map, [*faulty, *open_lines], options)
+        raise _nothing(site_map, [*faulty, *open_lines])
     rotation_deg = _rotation_deg(near, options)
     turned = _moved(near, lambda places: rotated(places, -rotation_deg))
-    left, bottom, right, top = _bounds_m(turned, plane, rotation_deg, options, ledger)
-    size_m = np.array([right - left, top - bottom])
-    if size_m.max() > MOST_SITE_M:
-        raise BlastEnvError(
-            f"{site_map.path}: the site would be {size_m[0]:,.0f} x {size_m[1]:,.0f} m, must be at "
-            f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
-        )
-    offsets = grid_offset_m(
-        [each.geometry for each in _outlines(turned, (left, bottom, right, top))]
-    )
-    asked = options.size_m is not None
-    corner = [
-        _on_grid(low, offset, asked) for low, offset in zip((left, bottom), offsets, strict=True)
-    ]
-    far = (corner[0] + size_m[0], corner[1] + size_m[1]) if asked else (right, top)
-    counts = [
-        int(np.ceil((high - low) / MODULE_SIDE_M - _ROUNDING))
-        for low, high in zip(corner, far, strict=True)
-    ]
+    corner_m, shape = _grid(site_map, turned, plane, rotation_deg)
     layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
     site = PlacedSite(
         path=site_map.path,
+        options=options,
+        ledger=ledger,
         plane=plane,
         rotation_deg=rotation_deg,
-        corner_m=(corner[0], corner[1]),
-        shape=(counts[1], counts[0]),
-        things=tuple(_moved(turned, lambda places: places - np.array(corner))),
+        corner_m=corner_m,
+        shape=shape,
+        things=tuple(_moved(turned, lambda places: places - np.array(corner_m))),
         layers=tuple(layers),
     )
-    lines = _moved(open_lines, lambda places: rotated(places, -rotation_deg) - np.array(corner))
-    found = [*lines, *_moved(faulty, site.to_site)]
-    box = None if options.size_m is None else site.box
-    return replace(site, faulty=tuple(_faults(found, box, ledger)))
+    lines = _moved(open_lines, lambda places: rotated(places, -rotation_deg) - np.array(corner_m))
+    return replace(site, faulty=tuple(_faults([*lines, *_moved(faulty, site.to_site)], site)))
 
 
-def _faults(faulty: Iterable[Thing], box: BaseGeometry | None, ledger: Ledger) -> Iterator[Thing]:
-    """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger.
-
-    Args:
-        faulty: The objects, in site metres.
-        box: The site; `None` if it is the whole file.
-        ledger: The ledger of the import.
-    """
+def _faults(faulty: Iterable[Thing], site: PlacedSite) -> Iterator[Thing]:
+    """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger."""
+    is_whole_file = site.options.size_m is None
     for each in faulty:
-        if box is None or each.geometry.is_empty or shapely.intersects(each.geometry, box):
-            ledger.add(Deed.LEFT_OUT, each.fault, each.place, each.name)
+        if is_whole_file or each.geometry.is_empty or shapely.intersects(each.geometry, site.box):
+            site.ledger.add(Deed.LEFT_OUT, each.fault, each.place, each.name)
             yield each
         else:
-            ledger.add(Deed.PASSED, OUTSIDE, each.place, each.name)
+            site.ledger.add(Deed.PASSED, OUTSIDE, each.place, each.name)
 
 
-def _nothing(site_map: SiteMap, faulty: Sequence[Thing], options: ImportOptions) -> BlastEnvError:
+def _nothing(site_map: SiteMap, faulty: Sequence[Thing]) -> BlastEnvError:
     """Return the error of a map without a building."""
+    chosen = site_map.options.buildings_from
     faults = Counter(each.fault for each in faulty if each.role is Role.BUILDING)
     reasons = "; ".join(f"{count} {fault}" for fault, count in faults.items())
     if reasons:
         return BlastEnvError(f"{site_map.path}: has no building that can be used, but {reasons}")
     advice = "define them with --buildings-from and --charges-from"
-    if options.buildings_from:
-        advice = f"--buildings-from {' '.join(options.buildings_from)} chooses nothing"
+    if chosen:
+        advice = f"--buildings-from {' '.join(chosen)} chooses nothing"
     return BlastEnvError(f"{site_map.path}: has no building that is marked as such; {advice}")
-
-
-def _elsewhere(site_map: SiteMap, things: Sequence[Thing], options: ImportOptions) -> BlastEnvError:
-    """Return the error of a site around which the map has nothing."""
-    flag, place = ("--centre", options.centre) if options.centre else ("--origin", options.origin)
-    assert place is not None
-    x, y = place
-    box = shapely.box(*shapely.total_bounds([each.geometry for each in things]))
-    left, bottom, right, top = box.bounds
-    hint = _EXCHANGED if shapely.intersects_xy(box, y, x) else ""
-    return BlastEnvError(
-        f"{site_map.path}: has nothing near {flag} {x:.10g},{y:.10g}, but from "
-        f"{left:.10g},{bottom:.10g} to {right:.10g},{top:.10g}{hint}"
-    )
 
 
 def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:
@@ -290,50 +253,36 @@ def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
     return fixed or things
 
 
-def _near(
-    site_map: SiteMap,
-    things: Sequence[Thing],
-    plane: Plane,
-    options: ImportOptions,
-    ledger: Ledger,
-) -> list[Thing]:
+def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thing]:
     """Return the objects that may lie on the site, in metres of the plane."""
+    options = site_map.options
     measured = _moved(things, plane.to_metres)
     geometries = [each.geometry for each in measured]
-    if options.size_m is None:
-        bounds = shapely.bounds(geometries)
-        if not np.isfinite(bounds).all():
+    reference = options.origin or options.centre
+    if options.size_m is None or reference is None:
+        if not np.isfinite(shapely.bounds(geometries)).all():
             raise BlastEnvError(
                 f"{site_map.path}: reaches too far for one site: say --centre or --origin, and "
                 "--size"
             )
-        return list(_joined(measured, ledger))
+        return measured
     # The corner or the middle is the plane's reference; the site turns around it.
-    reference = options.origin or options.centre
     middle = plane.to_metres(np.array([reference]))[0]
     around = shapely.Point(middle).buffer(2.0 * float(np.hypot(*options.size_m)))
-    near = shapely.intersects(geometries, around)
-    for index in np.flatnonzero(~near):
-        ledger.add(Deed.PASSED, OUTSIDE, measured[int(index)].place, measured[int(index)].name)
-    return list(_joined((measured[index] for index in np.flatnonzero(near)), ledger))
-
-
-def _joined(things: Iterable[Thing], ledger: Ledger) -> Iterator[Thing]:
-    """Yield things, with the rectangles of an exported building joined again."""
-    buildings: dict[str, list[Thing]] = {}
-    for thing in things:
-        if thing.part_of:
-            buildings.setdefault(thing.part_of, []).append(thing)
-        else:
-            yield thing
-    for name, parts in buildings.items():
-        # Coordinates of a file are rounded: adjoining rectangles may have a tiny gap.
-        outline = shapely.union_all([each.geometry for each in parts], grid_size=_HAIR_M)
-        protected = any(each.protected for each in parts)
-        for each in parts[1:]:
-            kind, detail = "rectangles of a building", f"with {parts[0].place}"
-            ledger.add(Deed.MERGED, kind, each.place, each.name, detail)
-        yield replace(parts[0], geometry=outline, name=name, protected=protected)
+    is_near = shapely.intersects(geometries, around)
+    for index in np.flatnonzero(~is_near):
+        far = measured[int(index)]
+        site_map.ledger.add(Deed.PASSED, OUTSIDE, far.place, far.name)
+    if not is_near.any():
+        x, y = reference
+        left, bottom, right, top = shapely.total_bounds([each.geometry for each in things])
+        flag = "--origin" if options.centre is None else "--centre"
+        hint = _EXCHANGED if left <= y <= right and bottom <= x <= top else ""
+        raise BlastEnvError(
+            f"{site_map.path}: has nothing near {flag} {x:.10g},{y:.10g}, but from "
+            f"{left:.10g},{bottom:.10g} to {right:.10g},{top:.10g}{hint}"
+        )
+    return [measured[index] for index in np.flatnonzero(is_near)]
 
 
 def _moved(things: Sequence[Thing], move: Callable[[FloatArray], FloatArray]) -> list[Thing]:
@@ -351,14 +300,42 @@ def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
     return dominant_direction_deg(walls)
 
 
+def _grid(
+    site_map: SiteMap, things: Sequence[Thing], plane: Plane, rotation_deg: float
+) -> tuple[tuple[float, float], tuple[int, int]]:
+    """Return the site's corner in the turned plane, and its rows and columns of modules.
+
+    Raises:
+        BlastEnvError: If the site would be too large.
+    """
+    options = site_map.options
+    left, bottom, right, top = _bounds_m(site_map, things, plane, rotation_deg)
+    size_m = right - left, top - bottom
+    if max(size_m) > MOST_SITE_M:
+        raise BlastEnvError(
+            f"{site_map.path}: the site would be {size_m[0]:,.0f} x {size_m[1]:,.0f} m, must be at "
+            f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
+        )
+    box = shapely.box(left, bottom, right, top)
+    own = [each.geometry for each in things if each.role is Role.SITE]
+    buildings = np.array([each.geometry for each in things if each.role is Role.BUILDING])
+    offsets_m = grid_offset_m(own or buildings[shapely.intersects(buildings, box)].tolist())
+    corner_m, counts = [], []
+    for low_m, high_m, offset_m in zip((left, bottom), (right, top), offsets_m, strict=True):
+        steps = (low_m - offset_m) / MODULE_SIDE_M
+        is_fixed = options.size_m is not None
+        line = np.round(steps) if is_fixed else np.floor(steps + _ROUNDING)
+        corner_m.append(float(offset_m + line * MODULE_SIDE_M))
+        end_m = corner_m[-1] + high_m - low_m if is_fixed else high_m
+        counts.append(int(np.ceil((end_m - corner_m[-1]) / MODULE_SIDE_M - _ROUNDING)))
+    return (corner_m[0], corner_m[1]), (counts[1], counts[0])
+
+
 def _bounds_m(
-    things: Sequence[Thing],
-    plane: Plane,
-    rotation_deg: float,
-    options: ImportOptions,
-    ledger: Ledger,
+    site_map: SiteMap, things: Sequence[Thing], plane: Plane, rotation_deg: float
 ) -> tuple[float, float, float, float]:
     """Return the site's rectangle in the turned plane."""
+    options = site_map.options
     if options.size_m is not None:
         asked = options.origin or options.centre
         place = rotated(plane.to_metres(np.array([asked])), -rotation_deg)[0]
@@ -372,20 +349,18 @@ def _bounds_m(
     if chief[0].role is Role.SITE:
         margin_m = 0.0
     elif margin_m is None:
-        margin_m = _margin_m(things, bounds_m, options, ledger)
+        margin_m = _margin_m(site_map, things, bounds_m)
     left, bottom, right, top = (float(each) for each in bounds_m)
     return left - margin_m, bottom - margin_m, right + margin_m, top + margin_m
 
 
-def _margin_m(
-    things: Sequence[Thing], bounds_m: FloatArray, options: ImportOptions, ledger: Ledger
-) -> float:
+def _margin_m(site_map: SiteMap, things: Sequence[Thing], bounds_m: FloatArray) -> float:
     """Return the usual margin, or one that reaches beyond the nearest street if that has none.
 
     A wider margin is a guess in the ledger.
     """
     streets = [each for each in things if each.role is Role.CHARGE]
-    if options.charge_at or not streets or not all(each.is_line for each in streets):
+    if site_map.options.charge_at or not streets or not all(each.is_line for each in streets):
         return MARGIN_M
     lines = [shapely.union_all(list(each.kerbs)) for each in streets]
     for margin_m in np.arange(MARGIN_M, MOST_MARGIN_M + 1.0):
@@ -400,21 +375,5 @@ def _margin_m(
         nearest = streets[lengths_m.argmax()]
         margin_m += np.ceil(nearest.width_m or 0.0)
         detail = f"--margin {margin_m:g} for {MARGIN_M:g}"
-        ledger.add(Deed.GUESSED, _WIDER, nearest.place, nearest.name, detail)
+        site_map.ledger.add(Deed.GUESSED, _WIDER, nearest.place, nearest.name, detail)
     return float(margin_m)
-
-
-def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, float]) -> list[Thing]:
-    """Return the outlines that fix the grid: the site's own, or the buildings on the site."""
-    box = shapely.box(*bounds_m)
-    own = [each for each in things if each.role is Role.SITE]
-    buildings = [each for each in things if each.role is Role.BUILDING]
-    on_site = shapely.intersects([each.geometry for each in buildings], box)
-    return own or [buildings[index] for index in np.flatnonzero(on_site)]
-
-
-def _on_grid(low_m: float, offset_m: float, nearest: bool) -> float:
-    """Return the grid line nearest to a place, or the last one before it."""
-    steps = (low_m - offset_m) / MODULE_SIDE_M
-    count = np.round(steps) if nearest else np.floor(steps + _ROUNDING)
-    return float(offset_m + count * MODULE_SIDE_M)

@@ -141,29 +141,21 @@ class DrawingPlane:
         )
 
 
-@dataclass(frozen=True)
-class MapCoordinates:
-    """Coordinates on the Earth.
-
-    Attributes:
-        crs: Their reference system as pyproj reads it; x is easting or longitude.
-    """
-
-    crs: str
-
-
 Plane = LocalPlane | DrawingPlane
 
 
-def plane_around(coordinates: MapCoordinates | DrawingPlane, place: tuple[float, float]) -> Plane:
+def plane_around(crs: str | None, unit_m: float, place: tuple[float, float]) -> Plane:
     """Return the plane in which a map is measured, around a place of it.
+
+    Args:
+        crs: Reference system of the map; `None` for a drawing.
+        unit_m: Length of the unit of a drawing, m.
+        place: The place, in the coordinates of the map.
 
     Raises:
         BlastEnvError: As `LocalPlane.around`.
     """
-    if isinstance(coordinates, MapCoordinates):
-        return LocalPlane.around(coordinates.crs, place)
-    return coordinates
+    return DrawingPlane(unit_m) if crs is None else LocalPlane.around(crs, place)
 
 
 def rotated(places: FloatArray, angle_deg: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from traceback import walk_tb
 from typing import Final
@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
-from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
+from blast_env.io.importing.ledger import FATES, Deed, Ledger
+from blast_env.io.importing.options import ImportOptions
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -28,8 +29,12 @@ MOST_POINTS: Final = 500_000
 MOST_COORDINATE: Final = 1e12
 """Largest coordinate in any unit; in millimetres the Earth's circumference is 4e10."""
 
+WGS84: Final = "EPSG:4326"
+"""Longitude and latitude."""
+
+_UNUSED: Final = "objects of no use to the site"
+
 Tags = Mapping[str, str | float | bool]
-Remark = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -37,58 +42,91 @@ class MapFeature:
     """An object of a map.
 
     Attributes:
-        geometry: Its outline, line or point, in the coordinates of the source.
+        geometry: Its outline, line or point, in the coordinates of the source; as much of it as the
+            file has, if it is not usable.
         tags: Its properties, tags or layer in the source.
         place: Its place in the file, for messages: `features[12]`, `way 4711`.
+        fault: Why it is not usable, in the plural: `ways without all nodes`; an empty string if it
+            is.
     """
 
     geometry: BaseGeometry
     tags: Tags
     place: str
+    fault: str = ""
 
 
-@dataclass(frozen=True)
-class LostFeature(MapFeature):
-    """An object of a map that is not usable; its geometry is as much as the file has.
-
-    Attributes:
-        reason: The kind of the fault, in the plural: `ways without all nodes`.
-    """
-
-    reason: str
-
-
-@dataclass(frozen=True)
+@dataclass
 class SiteMap:
-    """A map or drawing.
+    """A map or drawing, to which its reader adds all objects.
 
     Attributes:
         path: The file.
-        coordinates: System of the coordinates.
+        options: Options of the import.
+        ledger: The ledger of the import.
+        crs: Reference system of its coordinates, as pyproj reads it; x is easting or longitude.
+            `None` for a drawing, whose place on the Earth is unknown.
+        unit_m: Length of the unit of a drawing, m.
         features: All outlines, lines and points; texts are points.
-        lost: Objects that are not usable.
-        remarks: Guesses and mends of reading, as (kind, place, detail).
-        merged: Parts of its objects, as (kind, place, detail).
+        points: Number of their points.
     """
 
     path: Path
-    coordinates: MapCoordinates | DrawingPlane
-    features: tuple[MapFeature, ...]
-    lost: tuple[LostFeature, ...] = ()
-    remarks: tuple[Remark, ...] = ()
-    merged: tuple[Remark, ...] = ()
+    options: ImportOptions
+    ledger: Ledger = field(default_factory=Ledger)
+    crs: str | None = None
+    unit_m: float = 1.0
+    features: list[MapFeature] = field(default_factory=list)
+    points: int = 0
 
     @property
-    def is_drawing(self) -> bool:
+    def has_layers(self) -> bool:
         """Whether its objects have layers instead of tags."""
         return self.path.suffix.lower() == ".dxf"
 
-    def __post_init__(self) -> None:
-        """Refuse a map with too many points or too large coordinates.
+    def add(self, feature: MapFeature) -> None:
+        """Add an object.
 
         Raises:
-            BlastEnvError: If it has more than `MOST_POINTS` points, or a coordinate beyond
-                `MOST_COORDINATE`.
+            BlastEnvError: If there are more than `MOST_FEATURES`, or more than `MOST_POINTS`
+                points.
+        """
+        self.features.append(feature)
+        self.points += int(shapely.get_num_coordinates(feature.geometry))
+        check_count(self.path, len(self.features), MOST_FEATURES, "outlines and lines")
+        check_count(self.path, self.points, MOST_POINTS, "points")
+
+    def settle(self, used: Mapping[str, str]) -> None:
+        """Complete the ledger, so that it has every object of the file; no guess about others.
+
+        Args:
+            used: The kinds of those used on the site, by their places in the file.
+        """
+        bounds = shapely.bounds([each.geometry for each in self.features]).reshape(-1, 4)
+        middles = 0.5 * (bounds[:, :2] + bounds[:, 2:])
+        positions = {
+            each.place: (float(x), float(y))
+            for each, (x, y) in zip(self.features, middles, strict=True)
+            if x == x
+        }
+        fates = {each.place for each in self.ledger.of(*FATES)}
+        for each in self.features:
+            if each.place in used:
+                self.ledger.add(Deed.READ, used[each.place], each.place)
+            elif each.place not in fates:
+                self.ledger.add(Deed.LEFT_OUT, _UNUSED, each.place)
+        elsewhere = {each.place for each in self.ledger.of(Deed.PASSED)}
+        self.ledger.entries = [
+            replace(each, position=positions.get(each.place))
+            for each in self.ledger.entries
+            if each.deed is not Deed.GUESSED or each.place not in elsewhere
+        ]
+
+    def check_coordinates(self) -> None:
+        """Refuse a map with a coordinate beyond `MOST_COORDINATE`.
+
+        Raises:
+            BlastEnvError: If it has one.
         """
         geometries = [each.geometry for each in self.features]
         coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
@@ -99,13 +137,10 @@ class SiteMap:
                 f"{self.path}: {owner.place}: has the coordinate {coordinates[is_wrong][0]:g}, "
                 f"must be within {MOST_COORDINATE:g}"
             )
-        points = shapely.get_num_coordinates(geometries)
-        if points.sum() > MOST_POINTS:
-            raise too_many_points(self.path)
 
 
-def checked_file(path: Path) -> Path:
-    """Return a path after checking that its file exists and is not too large.
+def check_file(path: Path) -> None:
+    """Refuse a file that does not exist or is too large.
 
     Raises:
         BlastEnvError: If there is no such file, or it has more than `MOST_BYTES` bytes.
@@ -119,11 +154,23 @@ def checked_file(path: Path) -> Path:
         raise BlastEnvError(
             f"{path}: has {size:,} bytes, must have at most {MOST_BYTES:,}: cut a smaller extract"
         )
-    return path
+
+
+def check_count(path: Path, count: int, most: int, what: str) -> None:
+    """Refuse a file that has too many of something.
+
+    Raises:
+        BlastEnvError: If the count is above the most.
+    """
+    if count > most:
+        raise BlastEnvError(
+            f"{path}: has more than {most:,} {what}, must have at most that many: cut a smaller "
+            "extract"
+        )
 
 
 @contextmanager
-def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
+def errors_of(package: str, path: object, kind: str) -> Iterator[None]:
     """Convert any exception of a library in the block to the error of an unreadable file.
 
     Libraries report faults of a file with exceptions of many types. An exception without the
@@ -131,8 +178,8 @@ def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
 
     Args:
         package: Name of the library.
-        path: The file.
-        kind: Format of the file, for the message.
+        path: The file, or a place in it.
+        kind: Its format, for the message.
 
     Raises:
         BlastEnvError: If the library raises an exception.
@@ -146,19 +193,3 @@ def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
             raise
         what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
         raise BlastEnvError(f"{path}: cannot be read as {kind}: {what}") from error
-
-
-def too_many_points(path: Path) -> BlastEnvError:
-    """Return the error of a file with more than `MOST_POINTS` points."""
-    return BlastEnvError(
-        f"{path}: has more than {MOST_POINTS:,} points, must have at most that many: cut a smaller "
-        "extract"
-    )
-
-
-def too_many(path: Path) -> BlastEnvError:
-    """Return the error of a file with more than `MOST_FEATURES` features."""
-    return BlastEnvError(
-        f"{path}: has more than {MOST_FEATURES:,} outlines and lines, must have at most that many: "
-        "cut a smaller extract"
-    )

@@ -1,4 +1,4 @@
-"""Outlines as cells, cells as rectangles, and how far those are from the outlines."""
+"""Outlines as modules, these as rectangles, and how far they are from the outlines."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from blast_env.geometry import fewest_runs
-from blast_env.io.importing.cells import Deviation, covered_shares, in_blocks
+from blast_env.io.importing.fitting import Deviation
+from blast_env.io.importing.ground import cells_of, in_blocks
 from blast_env.io.importing.placing import dominant_direction_deg, grid_offset_m
 
 MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
@@ -49,13 +50,18 @@ def test_common_footprints_take_few_rectangles(rows: list[str], count: int) -> N
 
 @given(st.floats(0.0, 90.0), st.floats(2.0, 6.0), st.floats(2.0, 6.0))
 @settings(max_examples=50, deadline=None, derandomize=True)
-def test_shares_add_up_to_the_area(angle: float, width: float, height: float) -> None:
-    outline = shapely.affinity.rotate(shapely.box(5.0, 5.0, 5.0 + width, 5.0 + height), angle)
-    window, shares = covered_shares(outline, (40, 40))
-    assert 0.25 * shares.sum() == pytest.approx(width * height)
-    assert shares.min() >= 0.0
-    assert shares.max() <= 1.0 + 1e-9
-    assert shares.shape == (window[0].stop - window[0].start, window[1].stop - window[1].start)
+def test_modules_lie_with_their_centres_in_the_outline(
+    angle: float, width: float, height: float
+) -> None:
+    """Also where the outline reaches beyond the grid."""
+    house = shapely.affinity.rotate(shapely.box(5.0, 5.0, 5.0 + width, 5.0 + height), angle)
+    outline = shapely.union(house, shapely.box(-3.0, 9.0, 40.0, 11.0))
+    cells = cells_of(outline, (36, 30))
+    for row in range(36):
+        for column in range(30):
+            centre = shapely.Point(0.5 * column + 0.25, 0.5 * row + 0.25)
+            assert cells[row, column] == outline.intersects(centre)
+    assert not cells_of(shapely.box(-9.0, -9.0, -4.0, 50.0), (36, 30)).any()
 
 
 def test_deviation_is_area_and_largest_distance_of_the_outlines() -> None:
@@ -72,8 +78,8 @@ def test_coarser_blocks_are_whole() -> None:
     cells[0, :2] = cells[1, 0] = True  # three of four
     cells[2, 2] = True  # one of four
     cells[4, 4] = True  # one of one, beyond the grid is nothing
-    assert np.argwhere(in_blocks(cells, 2)).tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
-    assert (in_blocks(cells, 1) == cells).all()
+    assert np.argwhere(in_blocks(cells, 2, 0.5)).tolist() == [[0, 0], [0, 1], [1, 0], [1, 1]]
+    assert (in_blocks(cells, 1, 0.5) == cells).all()
 
 
 @given(st.floats(-44.0, 44.0))

@@ -290,9 +290,9 @@ def test_zone_in_site_metres_or_around_what_is_protected(tmp_path: Path) -> None
     path = written(tmp_path, outline(rectangle(0, 0, 6, 4), protected=True), charge(14.0, 2.0))
     given = imported(path, zone_m=(17.0, 8.0, 2.0, 9.0)).scenario.zone
     assert given.rectangle_m == (17.0, 8.0, 19.0, 17.0)
-    around = imported(path, zone_around_m=4.0, wall_height_m=2.5, clearance_m=0.5).scenario.zone
+    around = imported(path, zone_around_m=4.0, wall_height_m=2.5).scenario.zone
     assert around.rectangle_m == (6.0, 6.0, 20.0, 18.0)
-    assert (around.height_m, around.clearance_m) == (2.5, 0.5)
+    assert (around.height_m, around.clearance_m) == (2.5, 1.0)
 
 
 def test_zone_that_is_no_rectangle_is_closed_outside_its_outline(tmp_path: Path) -> None:

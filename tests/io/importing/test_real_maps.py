@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing.convert import read_map
 from blast_env.io.importing.ledger import Deed, Ledger, LedgerEntry
 from blast_env.plots.plan import site_features
 from blast_env.site import RectangleSource, Scenario
@@ -137,8 +138,31 @@ def test_relation_whose_rings_share_a_side_is_put_together(tmp_path: Path) -> No
     del outer
     site = imported(extract.write(tmp_path), **HOUSE_1)
     (court,) = (each for each in site.buildings if each.title == "Court")
-    assert court.outline.area == pytest.approx(80.0 - 16.0, rel=0.01)
+    (house,) = (each for each in site.buildings if each.title == "House")
+    right = shapely.box(20, 0, 30, 8) - shapely.box(20, 2, 24, 6)
+    right = shapely.affinity.translate(right, *house.outline.bounds[:2])
+    assert shapely.hausdorff_distance(court.outline, right) < 0.1
+    assert shapely.get_num_coordinates(court.outline) == 9
     assert places(entries(site, Deed.GUESSED, "rings that touch")) == ["relation 5"]
+
+
+def test_relation_of_many_rings_is_an_area_with_holes_and_islands(tmp_path: Path) -> None:
+    """As a wood with clearings, in which houses would stand: not one ring at a time."""
+    extract = town()
+    grid = [(22.0 + 3 * k, 2.0 + 3 * row) for k in range(28) for row in range(28)]
+    sides = [(20.0, 0.0, 90.0, 90.0), *((x, y, 2.0, 2.0) for x, y in grid)]
+    sides += [(22.5 + 3 * k, 2.5, 1.0, 1.0) for k in range(28)]
+    for number, side in enumerate(sides, start=10):
+        extract.way(number, rectangle(*side))
+    members = [(number, "") for number in range(10, 10 + len(sides))]
+    extract.relation(5, members, building="yes", height="6", name="Lattice")
+    path = extract.write(tmp_path)
+    site_map = read_map(path, ImportOptions())
+    (lattice,) = (each for each in site_map.features if each.place == "relation 5")
+    area_m2 = lattice.geometry.area * DEGREE_M**2
+    assert area_m2 == pytest.approx(90.0**2 - 28**2 * 4.0 + 28.0, rel=1e-3)
+    assert len(shapely.get_parts(lattice.geometry)) == 29
+    assert not site_map.ledger.entries
 
 
 @pytest.mark.parametrize("negative", [False, True])
