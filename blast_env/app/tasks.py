@@ -161,7 +161,7 @@ class AnswerTask:
             found = assess(self.site, layouts, charges, engine, teller.share, cache=self.cache)
             return found.answer(self.target, self.mass_error)
         evaluator = BlastEvaluator(self.site, engine, cache=self.cache)
-        return iter(capacity(evaluator, layouts, charges, teller.share).answer())
+        return iter(capacity(evaluator, layouts, charges, teller.share))
 
     def _advice(self, teller: Teller) -> tuple[Layout, list[AnswerPart]]:
         from blast_env.design.search.advised import AdviceJudge, advised, asked_site

@@ -200,7 +200,7 @@ def _capacity(
     print_cost([(engine, site, each) for each in charges for _ in layouts] * MOST_BLASTS)
     with progress_bar(f"{site.name}: masses and stand-offs") as progress:
         found = capacity_of(evaluator, layouts, charges, progress)
-    print_answer(found.answer())
+    print_answer(found)
 
 
 def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> None:

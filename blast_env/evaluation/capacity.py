@@ -5,7 +5,7 @@ histories are scaled by at most a factor of 1.3 in mass (`scaled_to`). A charge 
 building is as severe as a larger one of the same scaled distance. The blasts serve all levels.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log
 from typing import Final
@@ -197,59 +197,16 @@ class Ladder:
         return f"{x_m:.1f}, {y_m:.1f}"
 
 
-@dataclass(frozen=True, eq=False)
-class Capacity:
-    """The largest masses and the least stand-offs, for each layout and place of a charge.
-
-    Attributes:
-        ladders: The ladders by the name of the layout, one per place.
-        masses: The edge of the masses for each level, by the name of the layout and the place.
-        stand_offs: The same of the stand-offs.
-    """
-
-    ladders: Mapping[str, Sequence[Ladder]]
-    masses: Mapping[str, Sequence[Sequence[Edge]]]
-    stand_offs: Mapping[str, Sequence[Sequence[Edge]]]
-
-    def answer(self) -> Iterator[AnswerPart]:
-        """Yield both tables, one row per layout and place."""
-        every = [(name, each) for name, own in self.ladders.items() for each in own]
-        blasts = sum(each.blasts for _, each in every)
-        yield f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass"
-        levels = tuple(each.label for each in _LEVELS)
-        site = every[0][1].scenario.name
-        rows = [
-            (
-                *(name, each.place, f"{edges[0].stand_off_m:.1f} m"),
-                *(edge.mass_text for edge in edges),
-            )
-            for name, own in self.ladders.items()
-            for each, edges in zip(own, self.masses[name], strict=True)
-        ]
-        title = f"{site}: largest charge (kg TNT) that keeps each level of protection"
-        yield AnswerTable.of(title, ("layout", "place (m)", "stand-off", *levels), rows, 2)
-        rows = [
-            (
-                *(name, each.place, f"{each.charge.tnt_kg:g} kg"),
-                *(edge.stand_off_text for edge in edges),
-            )
-            for name, own in self.ladders.items()
-            for each, edges in zip(own, self.stand_offs[name], strict=True)
-        ]
-        title = f"{site}: least stand-off (m) that keeps each level of protection"
-        yield AnswerTable.of(title, ("layout", "place (m)", "charge", *levels), rows, 2)
-
-
 def capacity(
     evaluator: BlastEvaluator,
     layouts: Mapping[str, Layout],
     charges: Sequence[AnyCharge],
     progress: Tell | None = None,
-) -> Capacity:
+) -> list[AnswerPart]:
     """Return the largest masses and the least stand-offs that keep each level of protection.
 
     A few blasts run at each place. The stand-off changes along the line from the nearest protected
-    wall to the charge.
+    wall to the charge. Both tables have one row per layout and place.
 
     Args:
         evaluator: Its scenario, its engine, and its store of blasts.
@@ -257,21 +214,36 @@ def capacity(
         charges: The charges; their places count.
         progress: Called with the finished share of the places.
     """
-    ladders = {
-        name: [
-            Ladder(evaluator, layout, charge_against(evaluator.scenario, layout, each))
-            for each in charges
-        ]
-        for name, layout in layouts.items()
-    }
-    masses: dict[str, list[list[Edge]]] = {name: [] for name in layouts}
-    stand_offs: dict[str, list[list[Edge]]] = {name: [] for name in layouts}
-    done, whole = 0, len(layouts) * len(charges)
-    for name, own in ladders.items():
-        for ladder in own:
-            masses[name].append([ladder.edge(level) for level in _LEVELS])
-            stand_offs[name].append([ladder.edge(level, nearer=True) for level in _LEVELS])
-            done += 1
-            if progress is not None:
-                progress(done / whole)
-    return Capacity(ladders, masses, stand_offs)
+    scenario, blasts = evaluator.scenario, 0
+    masses: list[tuple[str, ...]] = []
+    stand_offs: list[tuple[str, ...]] = []
+    pairs = [(name, charge) for name in layouts for charge in charges]
+    for done, (name, charge) in enumerate(pairs, start=1):
+        layout = layouts[name]
+        ladder = Ladder(evaluator, layout, charge_against(scenario, layout, charge))
+        heavier = [ladder.edge(level) for level in _LEVELS]
+        nearer = [ladder.edge(level, nearer=True) for level in _LEVELS]
+        row, stand_off = (name, ladder.place), f"{heavier[0].stand_off_m:.1f} m"
+        masses.append((*row, stand_off, *(edge.mass_text for edge in heavier)))
+        mass = f"{ladder.charge.tnt_kg:g} kg"
+        stand_offs.append((*row, mass, *(edge.stand_off_text for edge in nearer)))
+        blasts += ladder.blasts
+        if progress is not None:
+            progress(done / len(pairs))
+    keeps = "that keeps each level of protection"
+    levels = [each.label for each in _LEVELS]
+    return [
+        f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass",
+        AnswerTable.of(
+            f"{scenario.name}: largest charge (kg TNT) {keeps}",
+            ("layout", "place (m)", "stand-off", *levels),
+            masses,
+            2,
+        ),
+        AnswerTable.of(
+            f"{scenario.name}: least stand-off (m) {keeps}",
+            ("layout", "place (m)", "charge", *levels),
+            stand_offs,
+            2,
+        ),
+    ]
