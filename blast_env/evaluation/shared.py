@@ -134,8 +134,7 @@ def keep_consequences(
 
     No piece of the layout was taken away.
     """
-    if evaluator.store.has_file:
-        evaluator.store.put(_key(evaluator, layout, charge), encoded(found))
+    evaluator.store.put(_key(evaluator, layout, charge), encoded(found))
 
 
 def _key(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> str:

@@ -52,6 +52,7 @@ MOST_BYTES: Final = 256_000_000
 """Default maximum size of the file of a store; a blast in the courtyard takes 2 kB."""
 
 _FILE: Final = "blasts.sqlite"
+_MOST_CONTENTS: Final = 64  # in memory, without a file; one with histories takes up to a megabyte
 
 
 class BlastStore:
@@ -77,6 +78,7 @@ class BlastStore:
             raise BlastEnvError(f"cache_size is {size}, must be at least 0")
         self.size = size
         self._loads: OrderedDict[BlastKey, BlastLoads] = OrderedDict()
+        self._contents: OrderedDict[str, bytes] = OrderedDict()
         self._file = None if folder is None else Store(Path(folder) / _FILE, most_bytes)
 
     @classmethod
@@ -87,11 +89,6 @@ class BlastStore:
         if value is not None and not isinstance(value, str | Path):
             raise BlastEnvError(f"cache is {value_text(value)}, must be a folder or a BlastStore")
         return cls(value, size)
-
-    @property
-    def has_file(self) -> bool:
-        """Whether loads are kept in a file, too."""
-        return self._file is not None
 
     @property
     def damaged(self) -> int:
@@ -124,18 +121,25 @@ class BlastStore:
             self.put(json.dumps(key), _encoded(loads))
 
     def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
-        """Return a content of the file as `Store.read`; `None` if it is missing or damaged."""
+        """Return a content as `Store.read`; `None` if it is missing or damaged."""
+        if self._file is None:
+            content = self._contents.get(key)
+            return None if content is None else decode(content)
         try:
-            return None if self._file is None else self._file.read(key, decode)
+            return self._file.read(key, decode)
         except BlastEnvError as error:
             warnings.warn(f"a blast counts as missing: {error}", RuntimeWarning, stacklevel=3)
             return None
 
     def put(self, key: str, content: bytes) -> None:
-        """Keep a content in the file, if there is one."""
+        """Keep a content in the file; in memory without one, the most recent ones."""
+        if self._file is None:
+            self._contents[key] = content
+            if len(self._contents) > _MOST_CONTENTS:
+                self._contents.popitem(last=False)
+            return
         try:
-            if self._file is not None:
-                self._file.put(key, content)
+            self._file.put(key, content)
         except BlastEnvError as error:
             warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=3)
 

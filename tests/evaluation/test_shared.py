@@ -54,9 +54,14 @@ def test_a_hardened_facade_responds_to_the_blast_of_the_other(
 ) -> None:
     site = glazed_yard(charges="mean")
     charge = site.sample_charge(np.random.default_rng(0))
-    plain = consequences(evaluator(tmp_path, site), (), [charge])
+    in_memory = BlastEvaluator(site, GasEngine())
+    for known in (in_memory, evaluator(tmp_path, site)):
+        plain = consequences(known, (), [charge])
     fresh = consequences(evaluator(tmp_path / "other", site), (TAKEN,), [charge])
     monkeypatch.setattr("blast_env.evaluation.shared._blasted", None)  # no blast
     hardened = consequences(evaluator(tmp_path, site), (TAKEN,), [charge])
+    pd.testing.assert_frame_equal(
+        tables(consequences(in_memory, (TAKEN,), [charge]))[0], tables(hardened)[0]
+    )
     pd.testing.assert_frame_equal(tables(hardened)[0], tables(fresh)[0])
     assert not tables(hardened)[0].equals(tables(plain)[0])
