@@ -1,7 +1,6 @@
-"""The page of a frame, laid out in pixels: a static ground and moving parts for each frame."""
+"""Figures as frames: still parts drawn once, and moving parts drawn anew in each frame."""
 
 from collections.abc import Iterable, Sequence
-from itertools import zip_longest
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +10,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.particles.structure import Colour
 from blast_env.plots.plan import BORDER, FAINT, INK, QUIET_INK, SITE
-from blast_env.plots.style import number_on_axis, render_extra, unit_interval
+from blast_env.plots.site_plan import add_bar, lay_out, trim_height, write_heading, write_legend
+from blast_env.plots.style import render_extra, unit_interval
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
@@ -22,102 +22,104 @@ with render_extra():
     from matplotlib.collections import LineCollection
     from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.text import Text
-    from matplotlib.ticker import Formatter, FuncFormatter
 
 Frame = NDArray[np.uint8]
 """A picture: rows from the top, pixels, and red, green and blue."""
 
 _DPI: Final = 100.0
-_LINES: Final = ((10, 12.0, INK, True), (36, 8.5, QUIET_INK, False), (54, 8.5, QUIET_INK, False))
-"""For each line of a heading: pixels from the top, points, colour, and whether it is bold."""
+_CLOCK: Final = ((10, 12.0, INK, True), (36, 8.5, QUIET_INK, False), (54, 8.5, QUIET_INK, False))
+"""For each line of the clock: pixels from the top, points, colour, and whether it is bold."""
 
-_MARGIN_PX: Final = 12
-_BAR_PX, BAR_LABELS_PX = 14, 52
-
-# Lengths of a page with one site, in pixels at a width of 960.
 _USUAL_WIDTH_PX: Final = 960
 _NARROWEST_PX, _WIDEST_PX = 320, 4096
 _SMALLEST_SCALE: Final = 0.72  # keeps letters legible
-_HEADER_PX, _LEFT_PX, _RIGHT_PX, _AXIS_PX = 78, 58, 20, 52
-_LETTER_PX, _LINE_PX, _SIGN_LETTERS = 6.6, 20, 7  # of a legend
-_LEAST_LINES: Final = 3
-_MOST_HIGH: Final = 0.8  # largest height of a site, as a share of the width
+_MARGIN_PX: Final = 12
+_PAD_IN: Final = 0.07
+_DECORATION_IN: Final = 6.0  # most height of heading, axes, colour bar and legend
+_MOST_HIGH: Final = 0.8  # largest height of a site, as a share of the width of the frame
 _HEADING_SHARE, _CLOCK_SHARE = 0.53, 0.44  # of the width
 _SMALLEST_GRID_PX: Final = 6.0
 
 
 class Sheet:
-    """A page in pixels.
+    """A figure of one or more columns of panels to scale, whose moving parts are drawn anew.
+
+    Draw the still parts, call `finish`, and then `frame` for each frame.
 
     Args:
-        width_px: Width of the page.
-        height_px: Its height.
-        scale: Size of letters and gaps, relative to the usual one.
+        width_px: Width of the frames.
+        scale: Size of letters, relative to the usual one.
+        columns: Number of columns.
+        areas_m: The area of the panel in each row, from the top; all columns show the same areas.
 
     Attributes:
-        figure: The page.
-        size_px: Its width and height.
-        scale: As given.
+        figure: The figure.
+        panels: The panels of each column, from the top.
+        size_px: Width and height of the frames; the height is known after `finish`.
     """
 
-    def __init__(self, width_px: int, height_px: int, scale: float = 1.0) -> None:
-        self.size_px, self.scale = (width_px, height_px), scale
-        dpi = scale * _DPI
-        self.figure = Figure(figsize=((width_px + 0.5) / dpi, (height_px + 0.5) / dpi), dpi=dpi)
+    def __init__(
+        self, width_px: int, scale: float, columns: int, areas_m: Sequence[Rectangle]
+    ) -> None:
+        self._scale, self._dpi = scale, scale * _DPI
+        width_in = (width_px + 0.5) / self._dpi
+        self.figure = Figure(
+            figsize=(width_in, columns * width_in + _DECORATION_IN),
+            dpi=self._dpi,
+            layout=ConstrainedLayoutEngine(h_pad=_PAD_IN),
+        )
         canvas: Any = FigureCanvasAgg  # partly without types
         self._canvas = canvas(self.figure)
+        self.size_px = (width_px, 0)
         self._ground: Any = None
         self._moving: list[Artist] = []
+        self._borders: list[Artist] = []
         self._clock: list[Text] = []
-        self._clock_share = 1.0
+        heights_m = [each.top - each.bottom for each in areas_m]
+        widest_m = max(each.right - each.left for each in areas_m)
+        share = min(_MOST_HIGH * columns * widest_m / heights_m[0], 1.0)
+        beside = [0.5 * columns * (1.0 / share - 1.0)] if share < 1.0 else []
+        widths = [*beside, *[1.0] * columns, *beside]
+        grid = self.figure.add_gridspec(
+            len(areas_m), len(widths), width_ratios=widths, height_ratios=heights_m
+        )
+        self.panels = [
+            [self.figure.add_subplot(grid[row, len(beside) + k]) for row in range(len(areas_m))]
+            for k in range(columns)
+        ]
+        for column in self.panels:
+            for axes, area in zip(column, areas_m, strict=True):
+                axes.set(xlim=(area.left, area.right), ylim=(area.bottom, area.top))
+                axes.set(aspect="equal", anchor="N")
 
-    def panel(self, left_px: float, bottom_px: float, wide_px: float, high_px: float) -> Axes:
-        """Return axes at a position in pixels; `bottom_px` is counted from the top of the page."""
+    def finish(self, least_px: int = 0) -> None:
+        """Fix the layout, with the height that the panels need, at least the given even one."""
+        trim_height(self.figure, [axes for column in self.panels for axes in column])
+        height_px = max(round(self.figure.get_figheight() * self._dpi), least_px)
+        self.size_px = (self.size_px[0], height_px + height_px % 2)
+        self.figure.set_figheight((self.size_px[1] + 0.5) / self._dpi)
+        lay_out(self.figure)
+        self.figure.set_layout_engine("none")
         width, height = self.size_px
-        place = (left_px / width, 1.0 - bottom_px / height, wide_px / width, high_px / height)
-        return self.figure.add_axes(place)
-
-    def write_heading(self, lines: Sequence[str], share: float) -> None:
-        """Write the lines at the upper left, shrunk to at most a share of the width."""
-        for text, line in zip(self._texts("left"), lines, strict=False):
-            text.set_text(line)
-            self._fit(text, share)
-
-    def add_clock(self, share: float) -> None:
-        """Add lines at the upper right that change with every frame; see `frame`."""
-        self._clock, self._clock_share = self._texts("right"), share
-        for text in self._clock:
-            text.set_animated(True)
-
-    def add_bar(
-        self, colours: ScalarMappable, bottom_px: float, label: str, form: Formatter, extend: str
-    ) -> Colorbar:
-        """Add a colour bar across the middle of the page."""
-        width, scale = self.size_px[0], self.scale
-        wide_px = min(0.7 * width, 720.0 * scale)
-        place = self.panel((width - wide_px) / 2.0, bottom_px, wide_px, _BAR_PX * scale)
-        bar = self.figure.colorbar(
-            colours, cax=place, orientation="horizontal", extend=extend, format=form
-        )
-        place.tick_params(labelsize=8)
-        bar.set_label(label, fontsize=9)
-        return bar
-
-    def add_legend(self, handles: Sequence[Artist], columns: int) -> None:
-        """Add a legend at the bottom of the page."""
-        self.figure.legend(
-            handles=handles,
-            loc="lower center",
-            ncols=columns,
-            fontsize=8,
-            frameon=False,
-            bbox_to_anchor=(0.5, 0.0),
-            borderaxespad=0.3,
-        )
+        self._clock = [
+            self.figure.text(
+                1.0 - _MARGIN_PX * self._scale / width,
+                1.0 - top_px * self._scale / height,
+                "",
+                ha="right",
+                va="top",
+                fontsize=size_pt,
+                color=unit_interval(colour),
+                fontweight="bold" if bold else "normal",
+                animated=True,
+            )
+            for top_px, size_pt, colour, bold in _CLOCK
+        ]
 
     def let_move(self, artists: Iterable[Artist]) -> None:
-        """Leave artists out of the static ground; draw them in every frame, in this order."""
+        """Leave artists out of the still ground; draw them in every frame, in this order."""
         for artist in artists:
             artist.set_animated(True)
             self._moving.append(artist)
@@ -130,28 +132,37 @@ class Sheet:
         if not labels[1]:
             axes.tick_params(labelleft=False)
         for spine in axes.spines.values():
-            spine.set_color(unit_interval(colour))
-            spine.set_linewidth(1.2)
-        self.let_move(axes.spines.values())
+            spine.set(color=unit_interval(colour), linewidth=1.2, animated=True)
+            self._borders.append(spine)
+
+    def add_bar(self, colours: ScalarMappable, label: str, extend: str) -> Colorbar:
+        """Add a colour bar below all panels."""
+        panels = [axes for column in self.panels for axes in column]
+        style = {"location": "bottom", "extend": extend, "aspect": 45, "pad": 0.01, "shrink": 0.8}
+        bar = add_bar(self.figure, panels, colours, label, **style)
+        bar.set_label(label, fontsize=9)
+        bar.ax.tick_params(labelsize=8)
+        return bar
 
     def frame(self, lines: Sequence[str], moving: Iterable[Artist] = ()) -> Frame:
-        """Return the page in its present state, uint8 (height, width, 3).
+        """Return the present state, uint8 (height, width, 3).
 
         Args:
-            lines: Lines of the clock.
+            lines: Lines of the clock, at the upper right.
             moving: Artists of this frame alone, drawn below all other moving ones.
         """
         if self._ground is None:
             self._canvas.draw()
             self._ground = self._canvas.copy_from_bbox(self.figure.bbox)
         self._canvas.restore_region(self._ground)
-        for text, line in zip_longest(self._clock, lines[: len(self._clock)], fillvalue=""):
-            assert isinstance(text, Text)
-            text.set_text(line)
-            if line:
-                self._fit(text, self._clock_share)
         renderer = self._canvas.get_renderer()
-        for artist in (*moving, *self._moving, *self._clock):
+        for number, text in enumerate(self._clock):
+            line, size_pt = "".join(lines[number : number + 1]), _CLOCK[number][1]
+            text.set(text=line, fontsize=size_pt)
+            if line:
+                share = text.get_window_extent(renderer).width / self.size_px[0]
+                text.set_fontsize(size_pt * min(1.0, _CLOCK_SHARE / share))
+        for artist in (*moving, *self._moving, *self._borders, *self._clock):
             artist.draw(renderer)
         pixels, frame = (
             np.asarray(self._canvas.buffer_rgba()),
@@ -161,46 +172,20 @@ class Sheet:
             frame[..., channel] = pixels[..., channel]
         return frame
 
-    def _texts(self, side: str) -> list[Text]:
-        width, height = self.size_px
-        margin = _MARGIN_PX * self.scale / width
-        return [
-            self.figure.text(
-                margin if side == "left" else 1.0 - margin,
-                1.0 - top_px * self.scale / height,
-                "",
-                ha=side,
-                va="top",
-                fontsize=size_pt,
-                color=unit_interval(colour),
-                fontweight="bold" if bold else "normal",
-            )
-            for top_px, size_pt, colour, bold in _LINES
-        ]
-
-    def _fit(self, text: Text, share: float) -> None:
-        """Set a line to its usual size, or shrink it to a share of the width."""
-        usual_pt = next(
-            size for _, size, _, bold in _LINES if bold == (text.get_fontweight() == "bold")
-        )
-        text.set_fontsize(usual_pt)
-        wide_px = text.get_window_extent(self._canvas.get_renderer()).width
-        text.set_fontsize(usual_pt * min(1.0, share * self.size_px[0] / max(wide_px, 1.0)))
-
 
 class SiteSheet(Sheet):
-    """A page with a site to scale, and below it a legend and a colour bar.
+    """A site to scale under a heading, above a colour bar and a legend.
 
     Args:
         site_m: The simulated area.
-        width_px: Width of the page, 320 to 4096.
+        width_px: Width of the frames, 320 to 4096.
         handles: Entries of the legend.
-        has_bar: Whether there is a colour bar; see `add_scale`.
-        least_px: Least height of the page; the height is even.
+        heading: The title, and two lines under it.
+        colours: A colour bar with its label; `None` for no bar.
+        least_px: Least height of the frames, an even one.
 
     Attributes:
         axes: Axes of the site, in metres.
-        pixels_per_m: Scale of the site.
 
     Raises:
         BlastEnvError: If the width is out of bounds.
@@ -211,43 +196,28 @@ class SiteSheet(Sheet):
         site_m: Rectangle,
         width_px: int,
         handles: Sequence[Artist],
-        has_bar: bool,
+        heading: tuple[str, str, str],
+        colours: tuple[ScalarMappable, str] | None = None,
         least_px: int = 0,
     ) -> None:
         if not _NARROWEST_PX <= width_px <= _WIDEST_PX:
             raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
-        scale = max(width_px / _USUAL_WIDTH_PX, _SMALLEST_SCALE)
-        width_m, height_m = site_m.right - site_m.left, site_m.top - site_m.bottom
-        room_px = width_px - (_LEFT_PX + _RIGHT_PX) * scale
-        # Both width and height are bounded.
-        self.pixels_per_m = min(room_px / width_m, _MOST_HIGH * width_px / height_m)
-        longest = max(len(str(each.get_label())) for each in handles)
-        entry_px = _LETTER_PX * scale * (longest + _SIGN_LETTERS)
-        columns = max(min(int(width_px / entry_px), len(handles)), 1)
-        # The same for most sites, so that all frames of an environment have one size.
-        lines = max(-(-len(handles) // columns), _LEAST_LINES)
-        lines_px = (lines * _LINE_PX + _MARGIN_PX) * scale
-        self._bar_px = _HEADER_PX * scale + self.pixels_per_m * height_m + _AXIS_PX * scale
-        bar_px = (_BAR_PX + BAR_LABELS_PX) * scale if has_bar else 0.0
-        height_px = max(round(self._bar_px + bar_px + lines_px), least_px)
-        super().__init__(width_px, height_px + height_px % 2, scale)
-        wide_px, high_px = self.pixels_per_m * width_m, self.pixels_per_m * height_m
-        left_px = _LEFT_PX * scale + (room_px - wide_px) / 2.0
-        self.axes = self.panel(left_px, _HEADER_PX * scale + high_px, wide_px, high_px)
-        self.axes.set(xlim=(site_m.left, site_m.right), ylim=(site_m.bottom, site_m.top))
+        super().__init__(width_px, max(width_px / _USUAL_WIDTH_PX, _SMALLEST_SCALE), 1, [site_m])
+        ((self.axes,),) = self.panels
         self.axes.set_facecolor(unit_interval(SITE))
-        self.add_legend(handles, columns)
-        self.add_clock(_CLOCK_SHARE)
-
-    def write(self, lines: Sequence[str]) -> None:
-        """Write the heading and draw the border; call it after adding the other moving parts."""
-        self.write_heading(lines, _HEADING_SHARE)
         self.frame_axes(self.axes, ("x (m)", "y (m)"), BORDER)
+        if colours is not None:
+            self.add_bar(*colours, "max")
+        write_legend(self.figure, handles)
+        title, *lines = heading
+        write_heading(self.figure, title, "\n".join(lines), _HEADING_SHARE, left=True)
+        self.finish(least_px)
 
-    def add_scale(self, colours: ScalarMappable, label: str) -> None:
-        """Add the colour bar."""
-        bottom_px = self._bar_px + _BAR_PX * self.scale
-        self.add_bar(colours, bottom_px, label, FuncFormatter(number_on_axis), "max")
+    @property
+    def pixels_per_m(self) -> float:
+        """Scale of the site."""
+        left, right = self.axes.get_xlim()
+        return float(self.axes.get_window_extent().width) / (right - left)
 
     def draw_grid(self, zone_m: Rectangle) -> Artist | None:
         """Draw the grid of a build zone; None if cells are smaller than 6 pixels."""

@@ -104,22 +104,25 @@ class FramePainter:
         features = blast_features(blast.scenario, blast.layout, scene.charge)
         on_ground = without(features, Kinds.SITE, *STANDING)
         handles = [*_signs(scene), *legend_of(on_ground)]
-        self.sheet = SiteSheet(scene.site_m, width_px, handles, True, height_px)
         colours = ScalarMappable(Normalize(0.0, unit.factor * full_impulse), load_colours())
-        self.sheet.add_scale(colours, f"{unit.label}; white: not hit")
+        usual_title, usual_subtitle = blast_title(blast)
+        self.sheet = SiteSheet(
+            scene.site_m,
+            width_px,
+            handles,
+            (
+                usual_title if title is None else title,
+                usual_subtitle if subtitle is None else subtitle,
+                remark,
+            ),
+            (colours, f"{unit.label}; white: not hit"),
+            height_px,
+        )
         for feature in on_ground:
             if feature.kind is Kinds.BUILD_ZONE:
                 self.sheet.draw_grid(feature.bounds_m)
         draw_features(self.sheet.axes, on_ground)
         self.sheet.let_move(write_names(self.sheet.axes, features, inside=False))
-        usual_title, usual_subtitle = blast_title(blast)
-        self.sheet.write(
-            (
-                usual_title if title is None else title,
-                usual_subtitle if subtitle is None else subtitle,
-                remark,
-            )
-        )
         self._balls: dict[tuple[int, int], Line2D] = {}
         self._loads: dict[str, tuple[PolyCollection, LineCollection]] = {}
         self._outlines: list[Artist] = []

@@ -51,12 +51,16 @@ class PlacingPainter:
         self._has_vehicles = any(isinstance(source, VehicleSource) for source in sources)
         given = without(site_features(scenario), Kinds.SITE, Kinds.CHARGE_PLACE)
         self._features = (*given, *source_features(sources))
-        blast_px = _particle_frames_px(scenario, width_px)
+        of_blast = _frames_of_blast(scenario, width_px)
+        least_px = 0 if of_blast is None else of_blast.size_px[1]
         site_m = build_site(scenario).site_m
-        self._sheet = SiteSheet(site_m, width_px, self._handles(), False, blast_px)
+        heading = (scenario.name, sources_text(sources), "")
+        handles = self._handles()
+        self._sheet = SiteSheet(site_m, width_px, handles, heading, least_px=least_px)
+        if of_blast is not None and of_blast.size_px == self.size_px:
+            self._sheet.axes.set_position(of_blast.sheet.axes.get_position())
         if scenario.build_zone is not None:
             self._sheet.draw_grid(scenario.build_zone.rectangle_m)
-        self._sheet.write((scenario.name, sources_text(sources)))
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -113,12 +117,12 @@ def sources_text(sources: Sequence[AnySource]) -> str:
     return f"{what} {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
 
 
-def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
-    """Return the height of frames of particles; 0 if particles cannot run the scenario."""
+def _frames_of_blast(scenario: Scenario, width_px: int) -> FramePainter | None:
+    """Return the painter of a blast of particles; `None` if they cannot run the scenario."""
     try:
-        return FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
+        return FramePainter(_fullest_blast(scenario), width_px=width_px)
     except BlastEnvError:
-        return 0
+        return None
 
 
 def _fullest_blast(scenario: Scenario) -> Blast:

@@ -19,7 +19,7 @@ from blast_env.evaluation.engines.gas import GasResult
 from blast_env.gas.probes import Snapshots
 from blast_env.gas.spherical_stage import SphericalStage
 from blast_env.geometry import Rectangle
-from blast_env.plots.canvas import BAR_LABELS_PX, Frame, Sheet
+from blast_env.plots.canvas import Frame, Sheet
 from blast_env.plots.gas import (
     MINUS,
     gas_subtitle,
@@ -43,6 +43,8 @@ from blast_env.plots.site_plan import (
     draw_features,
     legend_of,
     outline_path,
+    write_heading,
+    write_legend,
 )
 from blast_env.plots.style import barrier_text, render_extra, unit_interval
 from blast_env.site.blast_site import BlastSite, Block, StructureOutline
@@ -201,12 +203,7 @@ class _Picture(NamedTuple):
     distances_m: FloatArray
 
 
-# Lengths in pixels.
-_LEFT_PX, _GAP_PX, _RIGHT_PX = 66, 40, 22
-_HEADER_PX, _TITLE_PX, _TITLES_PX, _AXIS_PX, _BETWEEN_PX = 62, 22, 46, 48, 26
-_BAR_PX, _LEGEND_PX = 14, 30
-_LEGEND_ENTRY_PX: Final = 155
-_MOST_HIGH: Final = 0.8  # of a panel's width
+_USUAL_WIDTH_PX: Final = 960  # of one blast
 _SHARE_OF_TITLES: Final = 0.74  # of the width; the clock has the rest
 
 
@@ -239,18 +236,19 @@ class PressurePainter:
         low, high = site.site_m[along], site.site_m[along + 2]
         self._section_m = Rectangle(low, 0.0, high, site.air_height_m)
         self._images: list[_Picture] = []
-        handles = self._handles()
-        self.sheet, self._axes, bar_px = self._arrange(width_px, len(handles))
+        blasts = [shot.result.blast for shot in shots]
+        scale = max(width_px / (_USUAL_WIDTH_PX * len(shots)), 1.0)
+        self.sheet = Sheet(width_px, scale, len(shots), (self._site_m, self._section_m))
         for number in range(len(shots)):
             self._draw_plan(number)
             self._draw_section(number)
-        self._draw_bar(bar_px)
-        self.sheet.add_legend(handles, max(width_px // _LEGEND_ENTRY_PX, 2))
-        blasts = [shot.result.blast for shot in shots]
+        self._draw_bar()
+        write_legend(self.sheet.figure, self._handles())
         barrier = "" if len(shots) > 1 else f", {barrier_text(blasts[0].layout)}"
         title = f"{blasts[-1].scenario.name}: overpressure{barrier}"
-        self.sheet.write_heading((title, gas_subtitle(blasts)), _SHARE_OF_TITLES)
-        self.sheet.add_clock(1.0 - _SHARE_OF_TITLES)
+        share = _SHARE_OF_TITLES
+        write_heading(self.sheet.figure, title, gas_subtitle(blasts), share, left=True)
+        self.sheet.finish()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -282,37 +280,8 @@ class PressurePainter:
         index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
         return self._colours[index]
 
-    def _arrange(self, width_px: int, legend_entries: int) -> tuple[Sheet, list[list[Axes]], float]:
-        """Return the page, a plan and a section per blast, and the bottom of the colour bar, px."""
-        count = len(self.shots)
-        plan, section = self._site_m, self._section_m
-        panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
-        widest_m = max(plan.right - plan.left, section.right - section.left)
-        lines = -(-legend_entries // max(width_px // _LEGEND_ENTRY_PX, 2))
-        below_px = round(_BAR_PX + BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
-        first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
-        around_px = first_px + 2 * _AXIS_PX + _BETWEEN_PX + below_px
-        heights_m = [each.top - each.bottom for each in (plan, section)]
-        per_m = min(panel_px / widest_m, _MOST_HIGH * width_px / heights_m[0])
-        heights_px = [per_m * height_m for height_m in heights_m]
-        height_px = round(around_px + sum(heights_px))
-        sheet = Sheet(width_px, height_px + height_px % 2)
-        panels = []
-        for number in range(count):
-            middle_px = _LEFT_PX + number * (panel_px + _GAP_PX) + panel_px / 2.0
-            top_px = float(first_px)
-            pair = []
-            for each, high_px in zip((plan, section), heights_px, strict=True):
-                wide_px = per_m * (each.right - each.left)
-                axes = sheet.panel(middle_px - wide_px / 2.0, top_px + high_px, wide_px, high_px)
-                axes.set(xlim=(each.left, each.right), ylim=(each.bottom, each.top))
-                pair.append(axes)
-                top_px += high_px + _AXIS_PX + _BETWEEN_PX
-            panels.append(pair)
-        return sheet, panels, sheet.size_px[1] - below_px + _BAR_PX
-
     def _draw_plan(self, number: int) -> None:
-        axes, shot = self._axes[number][0], self.shots[number]
+        axes, shot = self.sheet.panels[number][0], self.shots[number]
         site, height_m = shot.result.run.site, shot.layer_m(0)
         self._add_image(number, 0)
         for outline, blocks in _wholes(shot):
@@ -336,7 +305,7 @@ class PressurePainter:
             )
 
     def _draw_section(self, number: int) -> None:
-        axes, shot = self._axes[number][1], self.shots[number]
+        axes, shot = self.sheet.panels[number][1], self.shots[number]
         site, at_m = shot.result.run.site, shot.layer_m(1)
         along = 1 - shot.section.normal
         self._add_image(number, 1)
@@ -359,7 +328,7 @@ class PressurePainter:
         axes.set_title(f"section at {shot.section.axis} = {at_m:g} m", fontsize=9, loc="left")
 
     def _add_image(self, number: int, plane: int) -> None:
-        axes, shot = self._axes[number][plane], self.shots[number]
+        axes, shot = self.sheet.panels[number][plane], self.shots[number]
         grid = shot.result.run.grid
         normal = shot.planes[plane].axis
         first, second = (axis for axis in range(3) if axis != normal)
@@ -396,14 +365,15 @@ class PressurePainter:
         patch.set(facecolor=colour if is_cut else "none")
         self.sheet.let_move([axes.add_patch(patch)])
 
-    def _draw_bar(self, bottom_px: float) -> None:
+    def _draw_bar(self) -> None:
         colours = ScalarMappable(self.scale, _COLOURS)
         label = "overpressure (kPa), the same scale everywhere"
-        bar = self.sheet.add_bar(colours, bottom_px, label, FuncFormatter(_signed), "both")
+        bar = self.sheet.add_bar(colours, label, "both")
         full = float(self.scale.vmax or 0.0)
         marks = [sign * share * full for share in _TICKS for sign in (-1.0, 1.0)]
         bar.ax.xaxis.set_major_locator(FixedLocator(sorted({*marks, 0.0})))
         bar.ax.xaxis.set_minor_locator(NullLocator())
+        bar.ax.xaxis.set_major_formatter(FuncFormatter(_signed))
 
     def _handles(self) -> list[Artist]:
         features = [
@@ -411,11 +381,7 @@ class PressurePainter:
             for shot in self.shots
             for feature in (*_on_ground(shot), *_solids(shot.result.run.site))
         ]
-        handles = legend_of(features)
-        for handle in handles:
-            if isinstance(handle, Line2D) and handle.get_marker() == "*":
-                handle.set_markersize(10.0)
-        return [*handles, Line2D([], [], **_CUT_STYLE, label="cut of the other view")]
+        return [*legend_of(features), Line2D([], [], **_CUT_STYLE, label="cut of the other view")]
 
 
 def _signed(value: float, position: int | None) -> str:  # noqa: ARG001

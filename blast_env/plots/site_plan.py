@@ -373,15 +373,19 @@ def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:
 
 
 def trim_height(figure: Figure, panels: Iterable[Axes]) -> None:
-    """Take the height from a figure that its panels with equal scales along x and y leave free."""
+    """Take the height from a figure that its panels leave free, which have one scale in x and y.
+
+    Heights of rows must be in proportion to what their panels show.
+    """
     lay_out(figure)
-    free: dict[int, float] = {}
+    rows: dict[int, float] = {}
+    used = 1.0
     for axes in panels:
-        place = axes.get_subplotspec()
+        place, share = axes.get_subplotspec(), axes.get_position(original=True).height
         assert place is not None
-        share = axes.get_position(original=True).height - axes.get_position().height
-        free[place.rowspan.start] = min(share, free.get(place.rowspan.start, share))
-    figure.set_figheight(figure.get_figheight() * (1.0 - sum(free.values())))
+        rows[place.rowspan.start] = share
+        used = min(used, axes.get_position().height / share)
+    figure.set_figheight(figure.get_figheight() * (1.0 - (1.0 - used) * sum(rows.values())))
 
 
 def lay_out(figure: Figure) -> None:
@@ -409,24 +413,38 @@ def _box(axes: Axes, feature: Feature, pixels_per_pt: float) -> Rectangle:
 
 
 _HEADING_SHARE: Final = 0.97  # of the width of a figure
+_LEFT_SHARE: Final = 0.0125
 
 
-def write_heading(figure: Figure, title: str, subtitle: str) -> None:
-    """Write the title of a figure and a subtitle."""
-    # The empty line reserves room for the subtitle, which the layout ignores.
-    heading = figure.suptitle(f"{title}\n", fontsize=14, fontweight="bold", linespacing=1.5)
-    share = heading.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
-    heading.set_fontsize(14 / max(share, 1.0))
+def write_heading(
+    figure: Figure, title: str, subtitle: str, share: float = _HEADING_SHARE, *, left: bool = False
+) -> None:
+    """Write the title of a figure and a subtitle of one or more lines.
+
+    Args:
+        figure: The figure, with axes.
+        title: The title.
+        subtitle: The subtitle.
+        share: Largest share of the width that they take.
+        left: Whether they begin at the left border rather than stand in the middle.
+    """
+    x, side = (_LEFT_SHARE, "left") if left else (0.5, "center")
+    # The empty lines reserve room for the subtitle, which the layout ignores.
+    room = "\n" * len(subtitle.split("\n"))
+    heading = figure.suptitle(
+        f"{title}{room}", x=x, ha=side, fontsize=14, fontweight="bold", linespacing=1.5
+    )
     line = figure.axes[0].annotate(
         subtitle,
-        xy=(0.5, 0.12),
+        xy=(0.0 if left else 0.5, 0.12),
         xycoords=heading,
-        ha="center",
+        ha=side,
         va="bottom",
         fontsize=10,
         color=unit_interval(QUIET_INK),
         annotation_clip=False,
     )
     line.set_in_layout(False)
-    share = line.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
-    line.set_fontsize(10 / max(share, 1.0))
+    for text, size_pt in ((heading, 14), (line, 10)):
+        wide = text.get_window_extent().width / (share * figure.bbox.width)
+        text.set_fontsize(size_pt / max(wide, 1.0))
