@@ -64,6 +64,12 @@ _MOST_PATH: Final = 4096
 """Most characters of a path; no system takes more."""
 
 
+def letters(number: int) -> str:
+    """Return A to Z for 0 to 25, then AA, AB and so on."""
+    before, last = divmod(number, 26)
+    return (letters(before - 1) if before else "") + chr(ord("A") + last)
+
+
 def whole_number(name: str, value: Any, least: int, most: int) -> int:
     """Return a count as a plain integer.
 

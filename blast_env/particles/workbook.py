@@ -121,9 +121,7 @@ def write_workbook(
     return path_of(path)
 
 
-def write_tables(
-    record: RunRecord, tables: Sequence[SheetTable], path: str | Path, title: str | None = None
-) -> Path:
+def write_tables(record: RunRecord, tables: Sequence[SheetTable], path: str | Path) -> Path:
     """Write a workbook with a run record and tables, and a sheet that explains their columns.
 
     As with `write_workbook`, the file is written whole or not at all, and is identical to the last
@@ -133,7 +131,6 @@ def write_tables(
         record: The run record, with the version of the package.
         tables: The tables.
         path: The file.
-        title: Title of the file; by default that of a blast.
 
     Returns:
         The path.
@@ -141,7 +138,7 @@ def write_tables(
     Raises:
         BlastEnvError: If the suffix is wrong or the file cannot be written there.
     """
-    title = title or f"Blast {record['scenario']}, engine {record['engine']}"
+    title = f"Blast {record['scenario']}, engine {record['engine']}"
     with _workbook(path, record, title) as writer:
         sheets = _Sheets(writer, EXCEL_ROWS)
         sheets.add_record(record)

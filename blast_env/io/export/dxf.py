@@ -8,17 +8,45 @@ from math import floor, inf
 from pathlib import Path
 from typing import Final, NamedTuple
 
+import shapely
+
 from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
-from blast_env.io.export.bill import LayoutPlan
+from blast_env.io.export.bill import MODULE, LayoutPlan, stock_of
 from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
 from blast_env.site import BuildZone
 from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
+from blast_env.values import letters
 
+with import_extra("export", "DXF files"):
+    from ezdxf import units
+    from ezdxf.document import Drawing
+    from ezdxf.enums import MTextEntityAlignment, TextEntityAlignment
+    from ezdxf.filemanagement import new
+    from ezdxf.layouts.layout import Modelspace
+
+VERSION: Final = "R2010"
+
+APPLICATION: Final = "BLAST_ENV"
+"""Application name of the extended data with the identifier of a module's outline."""
+
+CLEARANCE_LAYER: Final = "CLEARANCE"
+NOTES_LAYER: Final = "NOTES"
+
+ITEMS_LAYER: Final = "ITEMS"
+"""Layer of the texts in the pieces of a catalogue; it can be hidden."""
+
+_STRING: Final = 1000  # group code of a text in extended data
+_TEXT_HEIGHT_M: Final = 0.4
+_ROUNDING: Final = 1e-6  # of a count of signs
+_LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
+_POINT_SIZE_M: Final = 1.0
+_CROSS_IN_CIRCLE: Final = 35  # style of points ($PDMODE)
+_SIGN_WIDTH: Final = 0.75  # width over height of a letter, in most typefaces for drawings
 _DIGITS: Final = 9  # decimals of a metre: the rest is rounding error
 
 
@@ -32,30 +60,21 @@ def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
     zone = plan.scenario.build_zone
     if zone is None:
         return tuple(lines)
-    lines += _items(plan, zone) if zone.items else [_modules(plan, zone)]
+    counts = Counter(each.item if isinstance(each, Piece) else MODULE for each in plan.layout)
+    measures = {each.name for each in zone.measures}
+    for each in stock_of(plan.scenario):
+        if each.item not in measures:
+            high = "" if each.height_m is None else f", {_number(each.height_m)} m high"
+            size = f"{_number(each.length_m)} m x {_number(each.thickness_m)} m{high}"
+            count = f"{counts[each.item]} of a stock of {each.in_stock}"
+            lines.append(f"{each.item}: {count}, {size}")
+        elif counts[each.item]:
+            lines.append(f"{each.item}: taken")
     lines += _conditions(zone)
     if zone.budget is not None:
         cost = LayoutState.of(plan.scenario, plan.layout).cost
-        what = "pieces" if zone.items else "modules"
-        lines.append(f"Budget: {_number(zone.budget)}, of which the {what} take {_number(cost)}")
+        lines.append(f"Budget: {_number(zone.budget)}, of which the layout takes {_number(cost)}")
     return tuple(lines)
-
-
-def _modules(plan: LayoutPlan, zone: BuildZone) -> str:
-    side = f"{MODULE_SIDE_M:g}"
-    high = "" if zone.height_m is None else f", {_number(zone.height_m)} m high"
-    return f"Modules: {len(plan.layout)} of a stock of {zone.stock}, {side} m x {side} m each{high}"
-
-
-def _items(plan: LayoutPlan, zone: BuildZone) -> list[str]:
-    counts = Counter(each.item for each in plan.layout if isinstance(each, Piece))
-    sides = [(each.length_modules, each.thickness_modules) for each in zone.items]
-    sizes_m = [[_number(MODULE_SIDE_M * modules) for modules in pair] for pair in sides]
-    return [
-        f"{item.name}: {counts[item.name]} of a stock of {item.stock}, {length} m x {thickness} m,"
-        f" {_number(item.height_m)} m high"
-        for item, (length, thickness) in zip(zone.items, sizes_m, strict=True)
-    ] + [f"{each.name}: taken" for each in zone.measures if counts[each.name]]
 
 
 def _conditions(zone: BuildZone) -> tuple[str, str]:
@@ -88,8 +107,6 @@ def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[PointM, ...], ...]:
     The clearance is the least distance of any two points of module and structure. So the corners of
     the outlines are rounded by it, in short straight lines.
     """
-    import shapely  # a tenth of a second
-
     zone = plan.scenario.build_zone
     if zone is None or zone.clearance_m == 0.0:
         return ()
@@ -101,9 +118,6 @@ def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[PointM, ...], ...]:
         tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in ring.coords[:-1])
         for ring in shapely.get_rings(shapely.buffer(plans, zone.clearance_m, quad_segs=16))
     )
-
-
-_SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces for drawings
 
 
 @dataclass(frozen=True)
@@ -140,7 +154,7 @@ class Text:
 def key_of(plan: LayoutPlan) -> dict[str, str]:
     """Return the letter of each name that the notes explain; the same name has the same letter."""
     names = dict.fromkeys(_name(each) for each in plan.features if _has_letter(each))
-    return {name: _letter(number) for number, name in enumerate(names)}
+    return {name: letters(number) for number, name in enumerate(names)}
 
 
 def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
@@ -168,12 +182,6 @@ def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
         Text(each.label.text, each.label.feature, each.place.centre, height_m) for each in settled
     ]
     return (*inside, *letters)
-
-
-def _letter(number: int) -> str:
-    """Return A to Z, then AA, AB and so on."""
-    before, last = divmod(number, 26)
-    return (_letter(before - 1) if before else "") + chr(ord("A") + last)
 
 
 def _name(feature: Feature) -> str:
@@ -208,33 +216,6 @@ def _text_inside(feature: Feature, height_m: float) -> Text:
 def wrapped(lines: Sequence[str], characters: int) -> list[str]:
     """Return the lines broken between words to at most `characters`."""
     return [part for line in lines for part in textwrap.wrap(line, characters)]
-
-
-with import_extra("export", "DXF files"):
-    from ezdxf import units
-    from ezdxf.document import Drawing
-    from ezdxf.enums import MTextEntityAlignment, TextEntityAlignment
-    from ezdxf.filemanagement import new
-    from ezdxf.layouts.layout import Modelspace
-
-
-VERSION: Final = "R2010"
-
-APPLICATION: Final = "BLAST_ENV"
-"""Application name of the extended data with the identifier of a module's outline."""
-
-CLEARANCE_LAYER: Final = "CLEARANCE"
-NOTES_LAYER: Final = "NOTES"
-
-ITEMS_LAYER: Final = "ITEMS"
-"""Layer of the texts in the pieces of a catalogue; it can be hidden."""
-
-_STRING: Final = 1000  # group code of a text in extended data
-_TEXT_HEIGHT_M: Final = 0.4
-_ROUNDING: Final = 1e-6  # of a count of signs
-_LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
-_POINT_SIZE_M: Final = 1.0
-_CROSS_IN_CIRCLE: Final = 35  # style of points ($PDMODE)
 
 
 class _Style(NamedTuple):

@@ -1,4 +1,4 @@
-"""Layouts as CSV, Excel, GeoJSON, DXF and JSON."""
+"""Layouts as CSV, GeoJSON, DXF and JSON."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError, suggestion
 from blast_env.files import make_folder, write_text
-from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table, write_excel
+from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table
 from blast_env.layout import write_layout
 from blast_env.plots.plan import Feature
 from blast_env.site.sections import AnyGeoreference, PointM
@@ -135,7 +135,6 @@ _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], object]]] = MappingPro
         ".json": _write_json,
         ".csv": lambda plan, path: write_csv(element_table(plan), path),
         ".bill.csv": lambda plan, path: write_csv(bill_of_quantities(plan), path),
-        ".xlsx": write_excel,
         ".geojson": write_geojson,
         ".dxf": _write_dxf,
     }
@@ -151,7 +150,7 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
     Args:
         plan: The layout on its site.
         path: `.json` (a layout file), `.csv` (the modules or pieces), `.bill.csv` (the bill of
-            quantities), `.xlsx` (both), `.geojson` or `.dxf` (everything on the site); an existing
+            quantities), `.geojson` or `.dxf` (everything on the site); an existing
             file is replaced as a whole.
 
     Returns:

@@ -16,6 +16,7 @@ from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.footprint import Footprint, footprint_of
 from blast_env.units import MODULE_SIDE_M
+from blast_env.values import letters
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -109,7 +110,7 @@ class FittedBuilding:
             return (self.name,)
         joint = "" if self.name[-1].isdigit() else "_"
         return tuple(
-            f"{self.name}{joint}{_letters(number)}" for number in range(len(self.polygons))
+            f"{self.name}{joint}{letters(number).lower()}" for number in range(len(self.polygons))
         )
 
     @property
@@ -344,16 +345,6 @@ def plain_name(title: str) -> str:
     """Return a title in the letters of names: `Lodz_Sad`, `b_1st_National`; empty without any."""
     name = re.sub(r"[^A-Za-z0-9-]+", "_", anyascii(title).replace("'", "")).strip("_-")
     return (f"b_{name}" if name[:1].isdigit() else name)[:_MOST_NAME].rstrip("_-")
-
-
-def _letters(number: int) -> str:
-    """Return a, b, ... z, aa, ab, ..."""
-    text = ""
-    number += 1
-    while number:
-        number, letter = divmod(number - 1, 26)
-        text = chr(ord("a") + letter) + text
-    return text
 
 
 def _no_building(site: PlacedSite) -> BlastEnvError:

@@ -79,7 +79,7 @@ def test_notes_say_what_has_no_place_on_the_site(tmp_path: Path) -> None:
         "Scenario: perimeter_gate",
         "Units: metres, from the lower left corner of the site",
         "Charge: 500 kg TNT at (15.00, 20.50)",
-        "Modules: 3 of a stock of 16, 0.5 m x 0.5 m each",
+        "module: 3 of a stock of 16, 0.5 m x 0.5 m",
         "Clearance: 1.5 m at least between modules and structures",
         "Access way: 6 m wide, from left to right of the build zone, to be kept open",
         "A: the lane through the gap, and room to wait for the check",
@@ -96,7 +96,7 @@ def test_the_budget_is_there_with_what_the_modules_take(tmp_path: Path) -> None:
     plan = LayoutPlan(JUNCTION, some_cells(JUNCTION, 4))
     cost = LayoutState.of(JUNCTION, plan.layout).cost
     lines = notes_of(drawn(plan, tmp_path)).plain_text(split=True)
-    budget = lines.index(f"Budget: 16, of which the modules take {cost:g}")
+    budget = lines.index(f"Budget: 16, of which the layout takes {cost:g}")
     assert lines[budget - 2 : budget] == ["Clearance: none required", "Access way: none required"]
 
 

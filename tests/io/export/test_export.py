@@ -16,7 +16,7 @@ from ezdxf.layouts.layout import Modelspace
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_to
-from blast_env.io.export.bill import MODULE_COLUMNS
+from blast_env.io.export.bill import PIECE_COLUMNS
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.scene import build_scene
 from blast_env.plots.plan import SITE_KINDS
@@ -63,15 +63,15 @@ def test_json_is_a_layout_file_with_the_charge(tmp_path: Path) -> None:
 
 def test_csv_has_every_module_in_metres(tmp_path: Path) -> None:
     table = pd.read_csv(export_layout(plan(), tmp_path / "layout.csv"))
-    assert list(table.columns) == [column.name for column in MODULE_COLUMNS]
+    assert list(table.columns) == [column.name for column in PIECE_COLUMNS]
     assert list(zip(table["row"], table["column"], strict=True)) == list(LAYOUT)
     barrier = build_scene(COURTYARD, LAYOUT).obstacles()[-1]
-    assert list(table["module_id"]) == [part.module_id for part in barrier.parts]
+    assert list(table["piece"]) == [part.module_id for part in barrier.parts]
     for row, (left, bottom, right, top) in zip(
         table.to_dict("records"), squares_m(LAYOUT), strict=True
     ):
         assert (row["corner_x_m"], row["corner_y_m"]) == (left, bottom)
-        assert row["corner_x_m"] + row["side_m"] == right
+        assert row["corner_x_m"] + row["length_m"] == right
         assert (row["centre_x_m"], row["centre_y_m"]) == ((left + right) / 2, (bottom + top) / 2)
 
 
@@ -115,7 +115,8 @@ def test_dxf_is_in_metres_with_a_layer_a_kind(tmp_path: Path) -> None:
     corners = [np.array(corners_m(each)) for each in modules]
     assert [(*c.min(axis=0), *c.max(axis=0)) for c in corners] == squares_m(LAYOUT)
     identifiers = [each.get_xdata("BLAST_ENV")[0].value for each in modules]
-    assert identifiers == [part.module_id for part in plan().modules]
+    parts = build_scene(COURTYARD, LAYOUT).obstacles()[-1].parts
+    assert identifiers == [part.module_id for part in parts]
     (building,) = outlines(space, "PROTECTED_STRUCTURE")
     assert corners_m(building) == BUILDING_M
     (charge,) = space.query("POINT")
@@ -174,7 +175,7 @@ def test_a_folder_gets_a_layout_in_every_form(tmp_path: Path) -> None:
         ("layout.geojsn", "did you mean '.geojson'"),
         (
             "layout.dwg",
-            "must be .json, .csv, .bill.csv, .xlsx, .geojson or .dxf, or nothing for a folder",
+            "must be .json, .csv, .bill.csv, .geojson or .dxf, or nothing for a folder",
         ),
         ("file", "cannot be a folder"),
     ],

@@ -5,7 +5,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import openpyxl
 import pandas as pd
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.filemanagement import readfile
@@ -76,20 +75,6 @@ def test_the_bill_of_single_modules_has_one_line(tmp_path: Path) -> None:
     assert list(bill["cost"]) == [2.0, 2.0]
 
 
-def test_a_workbook_has_the_bill_and_the_pieces(tmp_path: Path) -> None:
-    path = export_layout(plan(), tmp_path / "layout.xlsx")
-    book = openpyxl.load_workbook(path)
-    assert book.sheetnames == ["Run", "Bill", "Pieces", "Columns"]
-    cells = [[cell.value for cell in row] for row in book["Bill"].iter_rows(min_row=2)]
-    assert [row[0] for row in cells] == ["wall", "post", "total"]
-    assert [row[-1] for row in cells] == [12.0, 1.0, 13.0]
-    assert [row[0].value for row in book["Pieces"].iter_rows(min_row=2)] == NAMES
-    said = {row[0].value: row[1].value for row in book["Run"].iter_rows(min_row=2)}
-    assert (said["scenario"], said["made by: seed"], said["budget"]) == ("walled_yard", "3", 20)
-    # The same to the last byte for the same content.
-    assert export_layout(plan(), tmp_path / "again.xlsx").read_bytes() == path.read_bytes()
-
-
 def test_geojson_has_pieces_with_item_height_and_cost(tmp_path: Path) -> None:
     content = json.loads(export_layout(plan(), tmp_path / "layout.geojson").read_text())
     of_kind: dict[str, list[dict[str, Any]]] = {}
@@ -123,7 +108,7 @@ def test_dxf_has_pieces_as_high_as_they_are_with_their_names(tmp_path: Path) -> 
     (notes,) = space.query('*[layer=="NOTES"]')
     lines = " ".join(notes.plain_text(split=True))  # type: ignore[attr-defined]
     assert "wall: 2 of a stock of 3, 1.5 m x 0.5 m, 2 m high" in lines
-    assert "Budget: 20, of which the pieces take 13" in lines
+    assert "Budget: 20, of which the layout takes 13" in lines
 
 
 def test_a_description_that_looks_like_a_formula_is_a_text_in_the_bill(tmp_path: Path) -> None:
