@@ -110,7 +110,7 @@ class BlastFiles:
         written = []
         for number, each in enumerate(reversed(results)):
             if self.heat_map is not None:
-                figure = figures.heat_map(each, scale=figures.common_scale(results))
+                figure = figures.heat_map(each, results)
                 written.append(figures.save_figure(figure, _named(self.heat_map, number)))
             if self.history is not None:
                 figure = figures.impulse_over_time(each)

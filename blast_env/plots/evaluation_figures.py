@@ -8,12 +8,9 @@ import numpy as np
 from blast_env.evaluation.answers import points
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.geometry import Layout, layout_counts
-from blast_env.layout.build_site import build_site
-from blast_env.particles.structure import obstacle_of
 from blast_env.plots.plan import (
     EXPLOSIVE,
     INK,
-    PROTECTED,
     QUIET_INK,
     Feature,
     Kinds,
@@ -24,11 +21,9 @@ from blast_env.plots.plan import (
     without,
 )
 from blast_env.plots.site_plan import (
-    add_bar,
-    draw_enlarged,
     draw_plan,
     legend_of,
-    load_colours,
+    trim_height,
     write_heading,
     write_legend,
     write_names,
@@ -36,12 +31,10 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import (
     charge_text,
     count_of,
-    nice_ceiling,
     render_extra,
     unit_interval,
 )
 from blast_env.site import Scenario
-from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.statistics import Estimate
 
 with render_extra():
@@ -56,9 +49,9 @@ with render_extra():
 _PERCENT = 100.0
 
 
-def _shown(scenario: Scenario, layout: Layout, charge: Charge | None = None) -> list[Feature]:
+def _shown(scenario: Scenario, layout: Layout) -> list[Feature]:
     """Return the features of the site with a layout, without charges but with vehicle entries."""
-    features = (*site_features(scenario, layout, charge), *vehicle_features(scenario, layout))
+    features = (*site_features(scenario, layout), *vehicle_features(scenario, layout))
     entries = [each for each in features if each.kind is Kinds.CHARGE_PLACE and scenario.vehicles]
     return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
 
@@ -139,8 +132,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     """Return a figure of an evaluation.
 
     On the left the site with the layout and all charges, coloured by the reduction of their
-    impulse. On the right the load of each threat without and with the barrier, and below it the
-    mean load on every module of the protected building with the largest load without a barrier.
+    impulse. On the right the load of each threat without and with the barrier.
 
     Args:
         evaluation: The evaluation.
@@ -149,24 +141,16 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     least_in, most_in = _PLAN_WIDTHS_IN
     plan_in = min(max(_PLAN_HEIGHT_IN * site.width_m / site.height_m, least_in), most_in)
     figure = Figure(figsize=(plan_in + _RIGHT_IN, _HEIGHT_IN), layout="constrained")
-    halves = figure.add_gridspec(1, 2, width_ratios=(plan_in, _RIGHT_IN))
-    plan = figure.add_subplot(halves[0])
-    right = halves[1].subgridspec(2, 1, height_ratios=(1.0, 1.05))
-    threats = figure.add_subplot(right[0])
-    lower = right[1].subgridspec(1, 2)
-    modules = [figure.add_subplot(lower[column]) for column in range(2)]
-    threat = evaluation.threats[0]
-    scene = build_site(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
+    plan, threats = figure.subplots(1, 2, width_ratios=(plan_in, _RIGHT_IN))
     features = _shown(evaluation.scenario, evaluation.layout)
     draw_plan(plan, features)
     plan.set_title("Site, layout and charges", fontsize=11)
     _draw_charges(plan, evaluation)
     plan.add_line(_worst_ring(*evaluation.worst.charge.position_m))
     _draw_threats(threats, evaluation)
-    _draw_modules(modules, evaluation, scene)
-    handles = [*_charge_legend(evaluation), *legend_of(features)]
-    write_legend(figure, handles)
+    write_legend(figure, [*_charge_legend(evaluation), *legend_of(features)])
     write_heading(figure, _title(evaluation), _subtitle(evaluation))
+    trim_height(figure, [plan])
     charges = [charge_feature(each.charge, "charge") for each in evaluation.outcomes]
     write_names(plan, [*features, *charges])
     return figure
@@ -272,44 +256,3 @@ def _name_threats(axes: Axes, what: str, names: Sequence[str]) -> None:
         rotation=0.0 if upright else 90.0,
     )
     axes.set_xlabel(f"{what}{bands}")
-
-
-def _draw_modules(panels: Sequence[Axes], evaluation: Evaluation, scene: BlastSite) -> None:
-    """Draw the mean load on the modules of one building, without and with the barrier.
-
-    Of a building of several parts the impulse is that of the building, as rewards count it.
-    """
-    table = evaluation.table.set_index("structure")
-    protected = table[table.protected]
-    names = evaluation.scenario.building_names
-    owners = np.array([names[each] for each in protected.index])
-    counted = protected.weight * protected.unprotected_impulse_pa_s
-    name = str(counted.groupby(owners).sum().idxmax())
-    parts = protected[owners == name]
-    building = evaluation.building_table.set_index("structure").loc[name]
-    modules = evaluation.module_table
-    own = modules[modules.structure.isin(parts.index)]
-    outlines = [each for each in scene.structures if each.name in parts.index]
-    *_, with_barrier, without_barrier, _ = modules.columns
-    columns = (without_barrier, with_barrier)
-    highest = float(own[list(columns)].to_numpy().max())
-    scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
-    for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
-        obstacles = [obstacle_of(outline) for outline in outlines]
-        for obstacle in obstacles:
-            impulses = own[own.structure == obstacle.name][column]
-            for part, impulse in zip(obstacle.parts, impulses, strict=True):
-                part.impulse, part.hits = float(impulse), int(impulse > 0.0)
-        draw_enlarged(axes, obstacles, scale, 0.4)
-        pa_s = building["impulse_pa_s" if column == with_barrier else "unprotected_impulse_pa_s"]
-        axes.set_title(
-            f"{evaluation.scenario.title_of(name)} {words} barrier\n{pa_s:,.0f} Pa·s",
-            fontsize=11,
-            color=unit_interval(PROTECTED),
-        )
-    figure = panels[0].get_figure(root=True)
-    assert figure is not None
-    is_scaled = evaluation.engine.needs_calibration
-    words = "impulse per module\n(simulation units)" if is_scaled else "momentum per module\n(N·s)"
-    label = f"mean {words}; white: not hit"
-    add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)

@@ -11,7 +11,7 @@ from blast_env.evaluation.engines import BlastResult
 from blast_env.files import write_atomically
 from blast_env.particles.structure import ModularObstacle
 from blast_env.particles.tables import faces_hit
-from blast_env.plots.heat_map import LoadScale, common_scale, heat_map
+from blast_env.plots.heat_map import heat_map
 from blast_env.plots.plan import (
     QUIET_INK,
 )
@@ -126,8 +126,6 @@ def _draw_structure(
 __all__ = [
     "FIGURE_SUFFIXES",
     "Figure",
-    "LoadScale",
-    "common_scale",
     "heat_map",
     "impulse_over_time",
     "png_of",

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import write_atomically
 from blast_env.particles.run import BlastRun
@@ -22,12 +21,12 @@ from blast_env.plots.film_files import (
     save_frames,
 )
 from blast_env.plots.frames import FramePainter
+from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import PAGE
 from blast_env.plots.style import (
     barrier_text,
     blast_title,
     charge_text,
-    nice_load,
     shown_until_s,
 )
 from blast_env.runner import Tell, share_of
@@ -144,30 +143,9 @@ def _paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) ->
     return painter.paint(balls, run.obstacles, time_s, note)
 
 
-def _scale_end(results: Sequence[BlastResult], unit: LoadUnit) -> float | None:
-    """Return the module impulse at the end of a common colour scale; None without any load.
-
-    It is the largest load of all results, rounded up to few digits in the unit.
-    """
-    largest = max(map(_largest_load, results))
-    return nice_load(unit, largest) if largest > 0.0 else None
-
-
-def _largest_load(result: BlastResult) -> float:
-    """Return the largest load of a protected module, or of any module if these have none."""
-    for obstacles in (
-        [obstacle for obstacle in result.obstacles if obstacle.protected],
-        list(result.obstacles),
-    ):
-        loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
-        if max(loads, default=0.0) > 0.0:
-            return max(loads)
-    return 0.0
-
-
 def _painters(results: Sequence[BlastResult], width_px: int) -> list[FramePainter]:
     """Return one painter per blast with a shared colour scale."""
-    unit = max(results, key=_largest_load).load_unit  # one scale, so that blasts are comparable
+    full, unit = LoadScale.of(results)  # one scale, so that blasts are comparable
     painters = []
     for result in results:
         title, subtitle = blast_title(result.blast)
@@ -179,7 +157,7 @@ def _painters(results: Sequence[BlastResult], width_px: int) -> list[FramePainte
             title=title,
             subtitle=subtitle,
             width_px=width_px - width_px % 2,
-            full_impulse=_scale_end(results, unit),
+            full_impulse=full / unit.factor,
             unit=unit.with_loads_of(result.load_unit),
         )
         painters.append(painter)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt
+from typing import NamedTuple
 
 from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
@@ -21,7 +22,6 @@ from blast_env.plots.plan import (
 )
 from blast_env.plots.site_plan import (
     add_bar,
-    draw_enlarged,
     draw_loads,
     draw_outlines,
     draw_plan,
@@ -56,47 +56,65 @@ _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
 _PANELS_HEIGHT_IN, _PANELS_WIDTHS_IN = 4.9, (2.2, 6.0)
 _PLAN_LABELS_IN, _PANEL_LABELS_IN, _COLOUR_BAR_IN = 1.0, 0.7, 1.3
 _MOST_PANELS = 4
+_REACH_M = 0.25  # around an enlarged building
 _POINTS_PER_IN = 72.0
 _LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
 _DARK_SHARE = 0.55  # of the scale; numbers turn white there
 
 
-@dataclass(frozen=True)
-class LoadScale:
-    """The colour scale of a heat map.
+class LoadScale(NamedTuple):
+    """A colour scale of module loads.
 
     Attributes:
-        full: The load of a module at the end of the scale, in the unit.
+        full: The load of a module at the end of the scale, in the unit; 0 without any load.
         unit: Unit of the loads shown.
     """
 
     full: float
     unit: LoadUnit
 
+    @classmethod
+    def of(cls, results: Sequence[BlastResult]) -> "LoadScale":
+        """Return a common scale of results, which ends at their largest load, rounded up.
+
+        It is that of a protected module, or of any if these have none. The unit is that of the
+        result with the largest load.
+        """
+        loads = [_largest_load(result) for result in results]
+        largest = max(loads)
+        unit = results[loads.index(largest)].load_unit
+        return cls(nice_ceiling(unit.factor * largest) if largest > 0.0 else 0.0, unit)
+
     @property
     def norm(self) -> Normalize:
         """The scale for matplotlib."""
-        return Normalize(0.0, self.full)
+        return Normalize(0.0, self.full or 1.0)
 
 
-def heat_map(
-    result: BlastResult, structure: str | None = None, scale: LoadScale | None = None
-) -> Figure:
+def _largest_load(result: BlastResult) -> float:
+    """Return the largest load of a protected module, or of any module if these have none."""
+    for obstacles in (
+        [obstacle for obstacle in result.obstacles if obstacle.protected],
+        list(result.obstacles),
+    ):
+        loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
+        if max(loads, default=0.0) > 0.0:
+            return max(loads)
+    return 0.0
+
+
+def heat_map(result: BlastResult, among: Sequence[BlastResult] = ()) -> Figure:
     """Return the impulse on every module, on the site plan and enlarged.
+
+    The protected buildings are enlarged, or all if none is protected; at most four, those with the
+    largest impulses.
 
     Args:
         result: The blast.
-        structure: The structure or building to enlarge. By default the protected buildings, or
-            all if none is protected; at most four, those with the largest impulses.
-        scale: The colour scale, for comparisons of maps; see `common_scale`. By default it ends
-            at the largest load in the enlarged buildings, rounded up.
-
-    Raises:
-        UnknownNameError: If there is no structure or building of that name.
+        among: Results with the same colour scale, for comparisons of their maps.
     """
-    chosen = _chosen(result, structure)
-    if scale is None:
-        scale = common_scale([result], structure)
+    chosen = _chosen(result)
+    scale = LoadScale.of([result, *among])
     columns = isqrt(len(chosen) - 1) + 1
     rows = -(-len(chosen) // columns)
     widths_in = _widths_in(result, chosen, columns, rows)
@@ -119,25 +137,6 @@ def heat_map(
     write_heading(figure, f"{title}: impulse per module", subtitle)
     write_names(overview, _features(result), inside=False)
     return figure
-
-
-def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> LoadScale:
-    """Return one colour scale for the heat maps of several results.
-
-    Args:
-        results: The results; the unit is that of the one with the largest load.
-        structure: As for `heat_map`.
-
-    Raises:
-        UnknownNameError: If there is no structure of that name.
-    """
-    loads = [
-        max(part.impulse for each in _chosen(result, structure) for part in each.modules)
-        for result in results
-    ]
-    largest = max(loads)
-    unit = results[loads.index(largest)].load_unit
-    return LoadScale(nice_ceiling(unit.factor * largest) if largest > 0.0 else 1.0, unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,17 +173,12 @@ class _Building:
         return (right - left) / MODULE_SIDE_M, (top - bottom) / MODULE_SIDE_M
 
 
-def _chosen(result: BlastResult, structure: str | None) -> list[_Building]:
-    scenario = result.blast.scenario
-    together = buildings_of(scenario.structures_with(result.blast.layout))
-    if structure is not None and structure not in together:
-        return [_Building(structure, (result.obstacle(structure),))]
+def _chosen(result: BlastResult) -> list[_Building]:
+    structures = result.blast.scenario.structures_with(result.blast.layout)
     buildings = [
         _Building(name, tuple(result.obstacle(each.name) for each in parts))
-        for name, parts in together.items()
+        for name, parts in buildings_of(structures).items()
     ]
-    if structure is not None:
-        return [each for each in buildings if each.name == structure]
     protected = [each for each in buildings if each.protected]
     by_impulse = sorted(protected or buildings, key=lambda each: -each.impulse)
     return by_impulse[:_MOST_PANELS]
@@ -236,7 +230,13 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
+    for each in building.obstacles:
+        draw_loads(axes, each, scale.norm, 0.6, scale.unit.factor)
+    draw_outlines(axes, building.obstacles)
+    left, bottom, right, top = Rectangle.around([each.rectangle_m for each in building.obstacles])
+    axes.set(xlim=(left - _REACH_M, right + _REACH_M), ylim=(bottom - _REACH_M, top + _REACH_M))
+    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    axes.spines[:].set_visible(False)
     hits = sum(part.hits for part in building.modules)
     title = result.blast.scenario.title_of(building.name)
     axes.set_title(
@@ -257,7 +257,7 @@ def _write_numbers(axes: Axes, building: _Building, scale: LoadScale, size_pt: f
     for part in building.modules:
         if part.hits:
             load = scale.unit.factor * part.impulse
-            dark = load > _DARK_SHARE * scale.full
+            dark = scale.norm(load) > _DARK_SHARE
             centre = part.rectangle_m.centre
             number = axes.text(
                 *centre,

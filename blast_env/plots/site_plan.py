@@ -276,24 +276,6 @@ def draw_loads(
     return modules, crosses
 
 
-def draw_enlarged(
-    axes: Axes,
-    obstacles: Sequence[ModularObstacle],
-    scale: Normalize,
-    linewidth: float,
-    factor: float = 1.0,
-) -> None:
-    """Draw the loads on the modules of structures so that they fill the axes; see `draw_loads`."""
-    for each in obstacles:
-        draw_loads(axes, each, scale, linewidth, factor)
-    draw_outlines(axes, obstacles)
-    left, bottom, right, top = Rectangle.around([each.rectangle_m for each in obstacles])
-    reach = 0.25
-    axes.set(xlim=(left - reach, right + reach), ylim=(bottom - reach, top + reach))
-    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
-    axes.spines[:].set_visible(False)
-
-
 def show_loads(
     drawn: tuple[PolyCollection, LineCollection], obstacle: ModularObstacle, factor: float = 1.0
 ) -> None:

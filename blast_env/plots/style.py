@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.calibration import LoadUnit
 from blast_env.errors import import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.geometry import Element, layout_counts
@@ -47,11 +46,6 @@ def nice_numbers(lowest: float, highest: float) -> list[float]:
 def nice_ceiling(value: float) -> float:
     """Return a positive value rounded up to few digits."""
     return nice_numbers(value * (1.0 - 1e-9), 2.0 * value)[0]
-
-
-def nice_load(unit: LoadUnit, impulse: float) -> float:
-    """Return a positive impulse, simulation units, rounded up to few digits in a unit."""
-    return nice_ceiling(unit.factor * impulse) / unit.factor
 
 
 def nice_floor(value: float) -> float:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
@@ -78,22 +78,6 @@ def test_every_threat_has_its_pair_and_the_worst_comes_first(
     ]
 
 
-def test_both_facades_have_their_mean_loads_on_one_scale(
-    figure: Figure, evaluation: Evaluation
-) -> None:
-    panels = figure.axes[2:4]
-    modules = [
-        each for axes in panels for each in axes.collections if isinstance(each, PolyCollection)
-    ]
-    for each, column in zip(modules, ("unprotected_impulse_sim", "impulse_sim"), strict=True):
-        shown = each.get_array()
-        assert isinstance(shown, np.ma.MaskedArray)
-        loads = shown.filled(0.0)
-        assert loads == pytest.approx(evaluation.module_table[column].to_numpy())
-    assert modules[0].get_clim() == modules[1].get_clim()
-    assert panels[0].get_title().startswith("building without barrier\n")
-
-
 def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
     figure: Figure, evaluation: Evaluation
 ) -> None:
@@ -122,7 +106,7 @@ def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> Non
     assert path.stat().st_size > 10_000
 
 
-def test_the_parts_of_a_building_are_drawn_together() -> None:
+def test_the_parts_of_a_building_have_one_load() -> None:
     document = hut().model_dump(exclude_none=True)
     (whole,) = document["structures"]
     left, bottom = whole["corner_m"]
@@ -133,10 +117,7 @@ def test_the_parts_of_a_building_are_drawn_together() -> None:
     engine = GasEngine(border_m=0.0, until=0.01)
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
     figure = evaluation_figure(found)
-    panels = figure.axes[2:4]
     assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
-    bar = next(each for each in figure.axes if "per module" in each.get_ylabel())
-    assert bar.get_ylabel() == "mean momentum per module\n(N·s); white: not hit"
     words = [each.get_text() for axes in figure.axes for each in axes.texts]
     assert not any("calibration" in each for each in words)
     table = found.table.set_index("structure")
@@ -144,12 +125,7 @@ def test_the_parts_of_a_building_are_drawn_together() -> None:
     assert (hall["structure"], hall["weight"], hall["protected"]) == ("hall", 1.0, True)
     assert hall["reduction"] == pytest.approx(found.mean_reduction)
     assert hall["peak_pa"] == table["peak_pa"].max()
-    for axes, column in zip(panels, ("unprotected_impulse_pa_s", "impulse_pa_s"), strict=True):
+    for column in ("unprotected_impulse_pa_s", "impulse_pa_s"):
         # Of eight sides of modules that look out, south has three, north five.
         mean = 0.375 * table[column]["south"] + 0.625 * table[column]["north"]
         assert mean == pytest.approx(hall[column])
-        assert axes.get_title().startswith("hall with")
-        assert f"{mean:,.0f} Pa·s" in axes.get_title()
-        assert axes.get_ylim() == (bottom - 0.25, bottom + 2.25)
-        drawn = [each for each in axes.collections if isinstance(each, PolyCollection)]
-        assert sum(len(each.get_paths()) for each in drawn) >= 16

@@ -10,15 +10,11 @@ from matplotlib.figure import Figure
 
 from blast_env import simulate
 from blast_env.calibration import LoadUnit
-from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.particles.calibration.model import seen_width_m
 from blast_env.particles.tables import faces_hit
-from blast_env.plots.figures import (
-    common_scale,
-    heat_map,
-    impulse_over_time,
-)
+from blast_env.plots.figures import heat_map, impulse_over_time
+from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.style import nice_ceiling, short_number
 from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
@@ -62,16 +58,6 @@ def test_the_heat_map_shows_every_modules_impulse(barrier_result: BlastResult) -
     assert {"shelter", "wall"} <= set(texts_of(figure))
 
 
-def test_a_structure_can_be_chosen_for_the_heat_map(result: BlastResult) -> None:
-    figure = heat_map(result, "wall")
-    assert figure.axes[1].get_title().startswith("wall\n")
-    impulse = modules_of(figure, 1).get_array()
-    assert impulse is not None
-    assert impulse.sum() == pytest.approx(result.impulse_sim("wall"))
-    with pytest.raises(UnknownNameError, match="did you mean 'wall'"):
-        heat_map(result, "walls")
-
-
 def test_impulse_over_time_ends_at_the_sums_of_the_facades(result: BlastResult) -> None:
     figure = impulse_over_time(result)
     for axes, name in zip(figure.axes, ("shelter", "wall"), strict=True):
@@ -111,9 +97,6 @@ def test_the_parts_of_a_building_are_one_on_the_heat_map(blast: Blast) -> None:
     assert title.startswith("town (protected)\n")
     assert f"{count} hits" in title
     assert len(figure.axes) == 3  # the site, the building, the bar
-    assert heat_map(joined, "wall").axes[1].get_title().startswith("wall\n")
-    with pytest.raises(UnknownNameError, match="did you mean 'wall'"):
-        heat_map(joined, "walls")
 
 
 # --- Loads of particles in Pa s where a calibration gives them, on one scale for several blasts.
@@ -167,8 +150,9 @@ def test_without_a_calibration_loads_stay_in_simulation_units(uncalibrated: Blas
 def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
     unprotected: BlastResult, protected: BlastResult
 ) -> None:
-    scale = common_scale([protected, unprotected])
-    figures = [heat_map(each, scale=scale) for each in (unprotected, protected)]
+    both = (unprotected, protected)
+    scale = LoadScale.of(both)
+    figures = [heat_map(each, both) for each in both]
     ends = [figure.axes[-1].get_ylim() for figure in figures]
     assert ends[0] == ends[1] == (0.0, scale.full)
     assert scale.full == nice_ceiling(scale.full)
