@@ -1,15 +1,12 @@
 """Files of films: the moments of a film, and its frames as MP4 and GIF."""
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import chain
 from math import floor, inf
 from pathlib import Path
-from subprocess import DEVNULL, PIPE, Popen
-from tempfile import TemporaryFile
-from typing import IO, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -171,58 +168,40 @@ def save_frames(
         _save_gif(frames, path, plan.frames_per_s, comment)
         return
     metadata = ["-metadata", f"title={title}", "-metadata", f"comment={comment}"]
-    with TemporaryFile() as messages:  # not a pipe, which would fill and stop ffmpeg
-        _save_mp4(iter(frames), path, plan.frames_per_s, metadata, messages)
+    _save_mp4(iter(frames), path, plan.frames_per_s, metadata)
 
 
 def _save_mp4(
-    frames: Iterator[Frame], path: Path, frames_per_s: float, metadata: list[str], said: IO[bytes]
+    frames: Iterator[Frame], path: Path, frames_per_s: float, metadata: Sequence[str]
 ) -> None:
     """Write H.264 in yuv420p, which every player supports.
 
-    Checks of ffmpeg's exit status and of the frames in the finished file ensure a complete film.
-    (The writer of imageio checks neither.)
+    Its frames are counted in the finished file, because the writer does not check that ffmpeg ended
+    well.
     """
     first = next(frames)
-    rate = str(Fraction(frames_per_s).limit_denominator())
-    size = f"{first.shape[1]}x{first.shape[0]}"
-    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate]
-    coded = ["-an", "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"]
     try:
-        program = imageio_ffmpeg.get_ffmpeg_exe()
+        writer = imageio_ffmpeg.write_frames(
+            str(path),
+            first.shape[1::-1],
+            fps=frames_per_s,
+            codec="libx264",
+            quality=None,
+            macro_block_size=2,
+            ffmpeg_log_level="error",
+            output_params=["-crf", "20", "-movflags", "+faststart", *metadata],
+        )
+        writer.send(None)
     except RuntimeError as error:
         raise BlastEnvError(f"films need ffmpeg: {error}") from error
-    encoder = Popen(
-        [
-            *(program, "-y", "-v", "error", *raw, "-i", "-", *coded),
-            *("-movflags", "+faststart", *metadata, str(path)),
-        ],
-        stdin=PIPE,
-        stdout=DEVNULL,
-        stderr=said,
-        start_new_session=True,  # Ctrl-C must reach this process alone
-    )
-    assert encoder.stdin is not None
     count = 0
-    try:
+    with closing(writer):
         for frame in chain([first], frames):
             try:
-                encoder.stdin.write(np.ascontiguousarray(frame).data)
-            except OSError:  # ffmpeg has ended; `said` has its message
-                break
+                writer.send(np.ascontiguousarray(frame))
+            except OSError as error:
+                raise BlastEnvError("the film cannot be written: ffmpeg has ended") from error
             count += 1
-        with suppress(BrokenPipeError):
-            encoder.communicate()
-    except BaseException:
-        encoder.kill()
-        encoder.communicate()
-        raise
-    if encoder.wait() != 0:
-        said.seek(0)
-        lines = said.read().decode(errors="replace").split("\n")
-        last = [line.strip() for line in lines if line.strip()][-1:]
-        reason = last[0] if last else f"ffmpeg ended with status {encoder.returncode}"
-        raise BlastEnvError(f"the film cannot be written: {reason}")
     try:
         found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
     except RuntimeError as error:
