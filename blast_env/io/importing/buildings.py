@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.options import ImportOptions
-from blast_env.io.importing.outlines import mended
+from blast_env.io.importing.outlines import areas_of, mended
 from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
@@ -175,7 +175,7 @@ def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
                 break
             if index < k and _overlap(thing, order[index]):
                 cut.append(order[index])
-                shape = _areas_of(shapely.difference(shape, order[index].geometry))
+                shape = areas_of(shapely.difference(shape, order[index].geometry))
                 found += _filled(thing, order[index], left, index)
         if cut:
             kind = "parts above their building" if cut[0].is_part else "buildings over buildings"
@@ -205,14 +205,7 @@ def _filled(lower: Thing, higher: Thing, left: list[Thing], index: int) -> Itera
     if above.area > _LEAST_M2:
         yield replace(higher, geometry=above, base_m=lower.base_m)
         rest = shapely.difference(left[index].geometry, lower.geometry)
-        left[index] = replace(left[index], geometry=_areas_of(rest))
-
-
-def _areas_of(shape: BaseGeometry) -> BaseGeometry:
-    """Return the areas of a geometry, without its lines and points."""
-    parts = shapely.get_parts(shape)
-    areas = parts[shapely.get_dimensions(parts) == 2]
-    return areas[0] if len(areas) == 1 else shapely.MultiPolygon(list(np.asarray(areas)))
+        left[index] = replace(left[index], geometry=areas_of(rest))
 
 
 def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:

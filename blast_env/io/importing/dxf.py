@@ -88,7 +88,7 @@ def read_dxf(site_map: SiteMap) -> None:
     with errors_of("ezdxf", path, "DXF"):
         document = _document(site_map)
         _set_scales(site_map, document)
-        _Unfolded(path, document).check()
+        _check_entities(path, document)
         site_map.unit_m = _metres_per_unit(path, document, options.units)
         for feature in _Drawn(site_map, document).features():
             site_map.add(feature)
@@ -128,61 +128,41 @@ def _set_scales(site_map: SiteMap, document: Drawing) -> None:
                     site_map.ledger.add(Deed.GUESSED, kind, place, detail=name)
 
 
-@dataclass(frozen=True)
-class _Unfolded:
-    """Counter of the entities of a drawing with all blocks expanded, without expanding them.
+def _check_entities(path: Path, document: Drawing) -> None:
+    """Refuse a drawing with too many entities or a number out of bounds, before it is expanded.
 
-    Attributes:
-        path: The file.
-        document: The drawing.
-        counts: Entities of the blocks counted so far, by their names in lower case.
+    Raises:
+        BlastEnvError: If there are more than `MOST_ENTITIES` entities once all blocks are expanded,
+            a number is beyond `MOST_COORDINATE`, or a block is nested too deeply or in itself.
     """
+    counts: dict[str, int] = {}  # of blocks, by their names in lower case
 
-    path: Path
-    document: Drawing
-    counts: dict[str, int] = field(default_factory=dict)
-
-    def check(self) -> None:
-        """Refuse a drawing with too many entities or a number out of bounds.
-
-        Raises:
-            BlastEnvError: If there are more than `MOST_ENTITIES` entities, a number is beyond
-                `MOST_COORDINATE`, or a block is nested too deeply or in itself.
-        """
-        count = self._count(self.document.modelspace(), ())
-        if count > MOST_ENTITIES:
-            raise BlastEnvError(
-                f"{self.path}: has {count:,} entities once its blocks are taken apart, must have "
-                f"at most {MOST_ENTITIES:,}"
-            )
-
-    def _count(self, entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
-        """Return the number of entities, including those of the blocks that they insert."""
+    def count(entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
         total = 0
         for entity in entities:
-            self._check_numbers(entity)
+            for number in _numbers(entity):
+                if not abs(number) <= MOST_COORDINATE:
+                    raise BlastEnvError(
+                        f"{path}: {entity.dxftype()} {entity.dxf.get('handle')}: has the number "
+                        f"{number:g}, must be within {MOST_COORDINATE:g}"
+                    )
             total += 1
             name, times = _block_of(entity)
-            block = self.document.blocks.get(name) if name else None
+            block = document.blocks.get(name) if name else None
             if block is None:
                 continue
             if name in above or len(above) == _MOST_NESTED:
                 raise BlastEnvError(
-                    f"{self.path}: the block {value_text(name)} lies in itself, or in more than "
+                    f"{path}: the block {value_text(name)} lies in itself, or in more than "
                     f"{_MOST_NESTED} others, must do neither"
                 )
-            if name not in self.counts:
-                self.counts[name] = self._count(block, (*above, name))
-            total += times * (1 + self.counts[name])
+            if name not in counts:
+                counts[name] = count(block, (*above, name))
+            total += times * (1 + counts[name])
         return total
 
-    def _check_numbers(self, entity: DXFEntity) -> None:
-        for number in _numbers(entity):
-            if not abs(number) <= MOST_COORDINATE:
-                raise BlastEnvError(
-                    f"{self.path}: {entity.dxftype()} {entity.dxf.get('handle')}: has the number "
-                    f"{number:g}, must be within {MOST_COORDINATE:g}"
-                )
+    total = count(document.modelspace(), ())
+    check_count(path, total, MOST_ENTITIES, "entities once its blocks are taken apart")
 
 
 def _block_of(entity: DXFEntity) -> tuple[str, int]:

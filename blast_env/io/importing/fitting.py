@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.ledger import Deed
-from blast_env.io.importing.outlines import check_outlines, walls_of
+from blast_env.io.importing.outlines import areas_of, check_outlines, walls_of
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.footprint import Footprint, footprint_of
@@ -220,38 +219,25 @@ def _kept(site: PlacedSite) -> list[Thing]:
     Raises:
         BlastEnvError: If there are too many buildings, or their outlines are too long.
     """
-    things, least_m2 = site.of_role(Role.BUILDING), site.options.least_area_m2
-    outlines = np.array([each.geometry for each in things], dtype=object)
+    least_m2 = site.options.least_area_m2
+    outlines = np.array([each.geometry for each in site.of_role(Role.BUILDING)], dtype=object)
     outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
+    kept = []
     inside = shapely.intersection(outlines, site.box)
-    parts, owner = shapely.get_parts(inside, return_index=True)
-    is_area = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
-    areas_m2 = np.bincount(owner[is_area], shapely.area(parts[is_area]), len(things))
-    chosen = np.flatnonzero(areas_m2 >= least_m2)
-    if len(chosen) > MOST_STRUCTURES:
-        raise _too_many(site, f"there are {len(chosen)} buildings on the site, must be")
-    geometries = [_together(parts[is_area & (owner == index)]) for index in chosen]
-    check_outlines(geometries, f"{site.path}: the buildings")
-    for thing, shape, area_m2 in zip(things, inside, areas_m2, strict=True):
+    for thing, outline, shape in zip(site.of_role(Role.BUILDING), outlines, inside, strict=True):
+        area = areas_of(shape)
         if shape.is_empty:
             site.ledger.add(Deed.PASSED, OUTSIDE, thing.place, thing.name)
-        elif area_m2 < least_m2:
+        elif area.area < least_m2:
             kind = f"buildings of less than {least_m2:g} m2 (--least-area)"
-            detail = f"{area_m2:.1f} m2 on the site"
+            detail = f"{area.area:.1f} m2 on the site"
             site.ledger.add(Deed.LEFT_OUT, kind, thing.place, thing.name, detail)
-    return [
-        replace(
-            things[index],
-            geometry=geometry,
-            name=things[index].name or _written_in(site, outlines[index]),
-        )
-        for index, geometry in zip(chosen, geometries, strict=True)
-    ]
-
-
-def _together(parts: NDArray[np.object_]) -> BaseGeometry:
-    geometry: BaseGeometry = parts[0] if len(parts) == 1 else shapely.MultiPolygon(list(parts))
-    return geometry
+        else:
+            kept.append((replace(thing, geometry=area), outline))
+    if len(kept) > MOST_STRUCTURES:
+        raise _too_many(site, f"there are {len(kept)} buildings on the site, must be")
+    check_outlines([each.geometry for each, _ in kept], f"{site.path}: the buildings")
+    return [replace(each, name=each.name or _written_in(site, whole)) for each, whole in kept]
 
 
 def _too_many(site: PlacedSite, what: str) -> BlastEnvError:

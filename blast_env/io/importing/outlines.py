@@ -98,3 +98,10 @@ def edges_of(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
     places, ring = shapely.get_coordinates(rings, return_index=True)
     same = ring[1:] == ring[:-1]
     return places[:-1][same], places[1:][same]
+
+
+def areas_of(shape: BaseGeometry) -> BaseGeometry:
+    """Return the areas of a geometry, without its lines and points."""
+    parts = shapely.get_parts(shape)
+    areas = parts[shapely.get_dimensions(parts) == 2]
+    return areas[0] if len(areas) == 1 else shapely.MultiPolygon(list(np.asarray(areas)))
