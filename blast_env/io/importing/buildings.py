@@ -6,18 +6,16 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.errors import BlastEnvError, shortened
 from blast_env.io.importing.ledger import Deed
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
 from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 _QUARTER_SIDES: Final = 4
 """A circle is a polygon of 16 sides."""

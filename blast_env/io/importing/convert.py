@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.geometry import Rectangle
@@ -17,7 +18,7 @@ from blast_env.io.importing.dxf import read_dxf
 from blast_env.io.importing.fitting import FittedBuilding, fit_buildings, plain_name
 from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
-from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Deed, Ledger
 from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
@@ -33,7 +34,6 @@ from blast_env.site.sources import SegmentSource
 from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):
-    import shapely
     from pyproj import CRS
 
 _PRESET: Final = "collisional"
@@ -73,19 +73,20 @@ class ImportedSite:
     @property
     def notes(self) -> tuple[str, ...]:
         """Changes, guesses, omissions and missing data, one line each."""
+        lines = self.ledger.lines(CHANGES, MOST_LETTERS)
         if self.scenario.build_zone is not None:
             ground = shapely.box(*self.scenario.build_zone.rectangle_m)
-            lines = [
+            streets = [
                 shapely.LineString(each.segment_m)
                 for each in self.scenario.charge
                 if isinstance(each, SegmentSource)
             ]
-            over = int(np.sum(shapely.intersects(lines, ground)))
+            over = int(np.sum(shapely.intersects(streets, ground)))
             words = f"the build zone lies over {over} parts of streets: barriers may stand there"
             words += ", unless keep_outs of the file keep them free"
-            return (*self.ledger.notes, *([words] if over else []))
+            return (*lines, *([words] if over else []))
         zone = "there is no build zone: say one with --zone, --zone-around or --zone-from"
-        return (*self.ledger.notes, zone)
+        return (*lines, zone)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -144,7 +145,7 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     ledger = site_map.ledger
     if options.strict:
         ledger.check_strict(path)
-    notes = ledger.notes_within(MOST_NOTE)[:MOST_NOTES]
+    notes = ledger.lines(CHANGES, MOST_NOTE)[:MOST_NOTES]
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",

@@ -8,6 +8,9 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
@@ -22,7 +25,6 @@ from blast_env.io.importing.site_map import (
 )
 
 with import_extra("maps", "maps and drawings"):
-    import shapely
     from ezdxf import recover, units
     from ezdxf.disassemble import make_primitive
     from ezdxf.document import Drawing
@@ -43,8 +45,6 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
     from ezdxf.render.mesh import MeshBuilder
     from ezdxf.transform import copies
-    from shapely.geometry import LineString, Point, Polygon
-    from shapely.geometry.base import BaseGeometry
 
 UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
     {"m": 1.0, "mm": 0.001, "cm": 0.01, "dm": 0.1, "km": 1000.0, "in": 0.0254, "ft": 0.3048}

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.geometry import Rectangle
@@ -18,9 +20,7 @@ from blast_env.units import MODULE_SIDE_M
 from blast_env.values import letters
 
 with import_extra("maps", "maps and drawings"):
-    import shapely
     from anyascii import anyascii
-    from shapely.geometry.base import BaseGeometry
 
 MOST_STRUCTURES: Final = 100
 """Most structures of a scenario."""

@@ -5,7 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
+import shapely
+from shapely.geometry import shape
+from shapely.geometry.base import BaseGeometry
+
+from blast_env.errors import BlastEnvError, shortened, value_text
 from blast_env.io.importing.site_map import (
     WGS84,
     MapFeature,
@@ -14,11 +18,6 @@ from blast_env.io.importing.site_map import (
     check_count,
     errors_of,
 )
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry import shape
-    from shapely.geometry.base import BaseGeometry
 
 MOST_VALUES: Final = 3_000_000
 """Most numbers, arrays and tables of a file: each takes some hundred bytes in memory."""

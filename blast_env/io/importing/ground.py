@@ -9,9 +9,12 @@ from itertools import chain
 from typing import Any, Final
 
 import numpy as np
+import shapely
+from shapely.affinity import translate
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import BoolArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, fewest_runs
 from blast_env.io.importing.fitting import FittedBuilding
 from blast_env.io.importing.ledger import Deed
@@ -19,11 +22,6 @@ from blast_env.io.importing.outlines import check_outlines, mended
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.affinity import translate
-    from shapely.geometry.base import BaseGeometry
 
 MOST_SOURCES: Final = 100
 """Most charges of a scenario."""

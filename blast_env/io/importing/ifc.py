@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
@@ -24,9 +26,6 @@ with import_extra("ifc", "building models"):
     from ifcopenshell.util import element as relations
     from ifcopenshell.util import placement
     from ifcopenshell.util.unit import calculate_unit_scale
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 _SHAPED: Final = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate", "IfcWindow")
 _GAP_M: Final = 0.3

@@ -5,19 +5,16 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from shapely.geometry import LineString, Polygon
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import import_extra
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry import LineString, Polygon
 
 CLOSE_M: Final = 0.1 * MODULE_SIDE_M
 """Largest gap of a line that counts as closed."""

@@ -1,7 +1,7 @@
 """The ledger of an import: what became of every object of a map or drawing."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -10,7 +10,9 @@ from typing import Any, Final
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.files import write_atomically
 
-_MOST_PLACES: Final = 5
+MOST_LETTERS: Final = 300
+"""Most letters of a line where people read it."""
+
 _MOST_CUT_LINES: Final = 12
 _MOST_NAMED: Final = 50
 
@@ -26,7 +28,7 @@ class Deed(StrEnum):
     PASSED = "not of the site"
 
 
-_SHOWN: Final = (Deed.MERGED, Deed.CLOSED, Deed.GUESSED, Deed.LEFT_OUT)
+CHANGES: Final = (Deed.MERGED, Deed.CLOSED, Deed.GUESSED, Deed.LEFT_OUT)
 """The deeds that change the site, which are notes of an import."""
 
 STRICT: Final = (Deed.GUESSED, Deed.LEFT_OUT)
@@ -90,30 +92,28 @@ class Ledger:
             BlastEnvError: If the file cannot be written.
         """
         is_json = path.suffix.lower() == ".json"
-        text = json.dumps(self.record, indent=1) if is_json else self.text
+        lines = "".join(f"{line}\n" for line in self.lines(tuple(Deed)))
+        text = json.dumps(self.record, indent=1) if is_json else lines
         with write_atomically(path) as target:
             target.write_text(text, encoding="utf-8")
         return path
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """A line for each kind of change to the site, with the first objects."""
-        return tuple(self._lines(_SHOWN, _MOST_PLACES))
+    def lines(self, deeds: Sequence[Deed], most: int | None = None) -> tuple[str, ...]:
+        """Return a line for each kind of entries, by deed.
 
-    @property
-    def text(self) -> str:
-        """All entries, by deed and kind."""
-        return "".join(f"{line}\n" for line in self._lines(tuple(Deed), None))
-
-    def notes_within(self, most: int) -> tuple[str, ...]:
-        """Return the notes with as many objects as `most` characters can name."""
-        lines = []
-        for kind, entries in self._grouped(_SHOWN).items():
-            count = min(len(entries), _MOST_NAMED)
-            while len(line := _line(kind, entries, count)) > most and count:
+        Args:
+            deeds: The deeds, in their order.
+            most: Most letters of a line, which names as many objects as it has room for.
+        """
+        found = []
+        for kind, entries in self._grouped(deeds).items():
+            count = len(entries) if most is None else min(len(entries), _MOST_NAMED)
+            line = _line(kind, entries, count)
+            while most is not None and len(line) > most and count:
                 count -= 1
-            lines.append(shortened(line, most))
-        return tuple(lines)
+                line = _line(kind, entries, count)
+            found.append(line if most is None else shortened(line, most))
+        return tuple(found)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -136,7 +136,7 @@ class Ledger:
         Raises:
             BlastEnvError: If it did; the message has all kinds.
         """
-        lines = list(self._lines(STRICT, _MOST_PLACES))
+        lines = self.lines(STRICT, MOST_LETTERS)
         if lines:
             more = f"\n  and {len(lines) - _MOST_CUT_LINES} more kinds" * (
                 len(lines) > _MOST_CUT_LINES
@@ -153,13 +153,9 @@ class Ledger:
                 groups.setdefault((deed, each.kind), []).append(each)
         return groups
 
-    def _lines(self, deeds: Sequence[Deed], most: int | None) -> Iterator[str]:
-        for kind, entries in self._grouped(deeds).items():
-            yield _line(kind, entries, most)
 
-
-def _line(kind: tuple[Deed, str], entries: Sequence[LedgerEntry], most: int | None) -> str:
+def _line(kind: tuple[Deed, str], entries: Sequence[LedgerEntry], count: int) -> str:
     """Return a line on the entries of a kind with the first of its objects."""
-    shown = [each.words for each in entries[:most]]
+    shown = [each.words for each in entries[:count]]
     more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []
     return f"{kind[0]}: {kind[1]}: {len(entries)} ({', '.join([*shown, *more])})"

@@ -12,6 +12,10 @@ from types import MappingProxyType
 from typing import IO, Any, Final
 from xml.parsers import expat
 
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.io.importing.ledger import Deed
@@ -27,10 +31,7 @@ from blast_env.io.importing.site_map import (
 
 with import_extra("maps", "maps and drawings"):
     import osmium
-    import shapely
     from osmium import osm
-    from shapely.geometry import LineString, Point, Polygon
-    from shapely.geometry.base import BaseGeometry
 
 SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
 
@@ -205,16 +206,12 @@ class _Extract:
             area = shapely.build_area(shapely.GeometryCollection(lines))
             if area.is_empty:
                 fault = OPEN
-            elif not area.is_valid or not isclose(area.length, geometry.length):
-                self.site_map.ledger.add(Deed.GUESSED, TOUCHING, place)
-            geometry = geometry if area.is_empty else _sound(area)
+            else:
+                if not area.is_valid or not isclose(area.length, geometry.length):
+                    self.site_map.ledger.add(Deed.GUESSED, TOUCHING, place)
+                # Holes that touch the border or each other are not valid, and become notches.
+                geometry = shapely.normalize(area if area.is_valid else area.buffer(0.0))
         self.site_map.add(MapFeature(geometry, tags, place, fault))
-
-
-def _sound(area: BaseGeometry) -> BaseGeometry:
-    """Return an area without the ground of the holes that touch its border or each other."""
-    valid = shapely.make_valid(area, method="structure", keep_collapsed=False)
-    return shapely.normalize(valid)
 
 
 def _by_age(number: int) -> tuple[bool, int]:

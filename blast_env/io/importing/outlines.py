@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError
 from blast_env.units import MODULE_SIDE_M
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 MOST_CROSSED: Final = 400_000
 """Most cells along all outlines together: 200 km of walls."""

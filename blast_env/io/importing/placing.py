@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.options import (
@@ -28,10 +30,6 @@ from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 _RIGHT_ANGLE_DEG: Final = 90.0
 _NEAR_DEG: Final = 4.0

@@ -8,14 +8,12 @@ from traceback import walk_tb
 from typing import Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.errors import BlastEnvError, shortened
 from blast_env.io.importing.ledger import FATES, Deed, Ledger
 from blast_env.io.importing.options import ImportOptions
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 MOST_BYTES: Final = 50_000_000
 """Most bytes of a file; an extract of a town has a few megabytes."""

@@ -10,14 +10,13 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.errors import MAX_TEXT, BlastEnvError, import_extra, value_text
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from blast_env.errors import MAX_TEXT, BlastEnvError, value_text
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 from blast_env.values import typed_number
-
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
 

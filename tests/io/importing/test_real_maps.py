@@ -663,7 +663,7 @@ def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
         "Bare",
         (13.0, 2.0),
     )
-    assert "read: building: 2 (features[0], features[1])" in site.ledger.text
+    assert "read: building: 2 (features[0], features[1])" in "".join(site.ledger.lines(tuple(Deed)))
     (note,) = site.scenario.import_notes
     assert note.startswith("guessed: heights not in the file")
 
@@ -672,7 +672,7 @@ def test_notes_in_a_scenario_name_as_many_objects_as_there_is_room() -> None:
     ledger = Ledger()
     for number in range(2000):
         ledger.add(Deed.GUESSED, "heights", f"way {number}", "Name" * 9)
-    (note,) = ledger.notes_within(1000)
+    (note,) = ledger.lines((Deed.GUESSED,), 1000)
     assert note.startswith("guessed: heights: 2000 (way 0 'Name")
     assert 900 < len(note) <= 1000
     assert note.endswith(" more)")
