@@ -219,3 +219,8 @@ def path_of(value: Any) -> Path:
             f"path is {value_text(text)} of {len(text)} characters, must have at most {_MOST_PATH}"
         )
     return Path(text)
+
+
+def count_of(noun: str, count: int) -> str:
+    """Return a count with its noun: `1 load limit`, `2 load limits`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

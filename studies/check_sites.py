@@ -32,7 +32,7 @@ from blast_env.layout import LayoutState
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import INK, STANDING, Feature, Kinds, site_features, without
 from blast_env.plots.site_plan import draw_plan, legend_of, write_legend
-from blast_env.plots.style import count_of, unit_interval
+from blast_env.plots.style import unit_interval
 from blast_env.runner import run_all
 from blast_env.site import Scenario, ScenarioError
 from blast_env.sites import (
@@ -47,6 +47,7 @@ from blast_env.sites import (
 )
 from blast_env.sites.criterion import cut_share_of
 from blast_env.sites.ranges import Ranges
+from blast_env.values import count_of
 
 LEAST_REDUCTION: Final = 0.15
 

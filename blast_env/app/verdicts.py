@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.app.records import BlastRecord
-from blast_env.evaluation.answers import AnswerTable
+from blast_env.evaluation.answers import AnswerTable, charge_text
 from blast_env.evaluation.consequences import (
     BuildingResponse,
     BuildingSummary,
@@ -104,9 +104,8 @@ def damage_png(building: BuildingResponse) -> bytes:
     from blast_env.plots.facade import facade_picture
     from blast_env.plots.figures import png_of
 
-    (x_m, y_m), tnt_kg = building.charge.position_m, building.charge.tnt_kg
-    words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
-    return png_of(facade_picture([(words, building)], building.building), _DPI)
+    rows = [(charge_text(building.charge), building)]
+    return png_of(facade_picture(rows, building.building), _DPI)
 
 
 def verdict_table(

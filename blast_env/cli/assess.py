@@ -39,7 +39,7 @@ from blast_env.cli.output import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.answers import charge_text, counted
+from blast_env.evaluation.answers import charge_text
 from blast_env.evaluation.assessment import Assessed
 from blast_env.evaluation.assessment import assess as assessed_by
 from blast_env.evaluation.capacity import MOST_BLASTS
@@ -73,6 +73,7 @@ from blast_env.site.presets import (
     NamedMass,
 )
 from blast_env.tables import write_csv
+from blast_env.values import count_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -175,7 +176,7 @@ def assess(
     print_line(engine.describe([site]))
     print_cost(judged_blasts(engine, site, drawn, len(layouts)))
     with resumable(resume_words(cache)):
-        with progress_bar(counted(len(drawn))) as progress:
+        with progress_bar(count_of("charge", len(drawn))) as progress:
             assessed = assessed_by(
                 site,
                 layouts,

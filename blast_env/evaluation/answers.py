@@ -59,11 +59,6 @@ def charge_text(charge: Charge) -> str:
     return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
 
 
-def counted(charges: int) -> str:
-    """Return a number of charges in words."""
-    return "1 charge" if charges == 1 else f"{charges} charges"
-
-
 def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
     """Yield the standing of the load on each building, with its reason.
 

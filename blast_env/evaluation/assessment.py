@@ -14,7 +14,6 @@ from blast_env.evaluation.answers import (
     AnswerTable,
     building_words,
     charge_text,
-    counted,
 )
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.consequences import (
@@ -35,6 +34,7 @@ from blast_env.response.requirements import Requirement
 from blast_env.runner import Tell, share_of
 from blast_env.site import AnyCharge, Scenario
 from blast_env.units import PA_PER_KPA
+from blast_env.values import count_of
 
 _RESPONSE: Final = (
     *("building", "level of protection", "panes broken", "worst pane (GSA, ISO)", "worst panel"),
@@ -129,7 +129,7 @@ class Assessed:
     def _verdict(self, target: LevelOfProtection) -> Iterator[AnswerPart]:
         judged = self.judged
         verdict, level = judged.verdict_word(target), judged.level_words_for(target)
-        charges = counted(len(judged.barriers))
+        charges = count_of("charge", len(judged.barriers))
         yield f"{self.scenario.name}, {self.name}: {verdict}: {level}, under {charges}"
         for building in judged.buildings:
             stood = judged.standing(building).words

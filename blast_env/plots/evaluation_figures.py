@@ -30,12 +30,12 @@ from blast_env.plots.site_plan import (
 )
 from blast_env.plots.style import (
     charge_text,
-    count_of,
     render_extra,
     unit_interval,
 )
 from blast_env.site import Scenario
 from blast_env.statistics import Estimate
+from blast_env.values import count_of
 
 with render_extra():
     from matplotlib.artist import Artist

@@ -20,7 +20,6 @@ from blast_env.plots.site_plan import (
 )
 from blast_env.plots.style import (
     blast_title,
-    count_of,
     number_on_axis,
     render_extra,
     short_number,
@@ -28,7 +27,7 @@ from blast_env.plots.style import (
     unit_interval,
 )
 from blast_env.units import MS_PER_S
-from blast_env.values import path_of
+from blast_env.values import count_of, path_of
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -33,7 +33,6 @@ from blast_env.plots.site_plan import (
 )
 from blast_env.plots.style import (
     blast_title,
-    count_of,
     nice_ceiling,
     render_extra,
     short_number,
@@ -41,6 +40,7 @@ from blast_env.plots.style import (
 )
 from blast_env.site.structures import buildings_of
 from blast_env.units import MODULE_SIDE_M
+from blast_env.values import count_of
 
 with render_extra():
     from matplotlib.axes import Axes

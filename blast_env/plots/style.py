@@ -91,11 +91,6 @@ def free_flight_impulse(scene: Scene) -> float:
     return momentum * share
 
 
-def count_of(noun: str, count: int) -> str:
-    """Return a count with its noun, singular or plural."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def barrier_text(layout: Sequence[Element]) -> str:
     """Return the barrier of a layout, in words."""
     return f"barrier of {layout_counts(layout)}" if layout else "no barrier"

@@ -34,9 +34,10 @@ from blast_env.report.outcomes import LoadPair
 from blast_env.report.peaks import PeakSource
 from blast_env.report.study import Study
 from blast_env.report.threats import place_text
-from blast_env.report.verdict import StudyVerdict, counted
+from blast_env.report.verdict import StudyVerdict
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
+from blast_env.values import count_of
 
 with import_extra("report", "reports"):
     from jinja2 import Environment, PackageLoader, StrictUndefined, Template, pass_context
@@ -124,7 +125,7 @@ def _template() -> Template:
         "percent": _percent,
         "gone": _gone,
         "span": _span,
-        "noun_of": counted,
+        "noun_of": lambda number, noun: count_of(noun, number),
         "css": _css,
         "impulse_error": _error,
         "share_error": lambda share: _error(100.0 * share, 1),

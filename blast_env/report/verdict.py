@@ -16,6 +16,7 @@ from blast_env.report.loads import TargetLoad
 from blast_env.report.outcomes import Limit, LoadPair
 from blast_env.report.study import Study
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.values import count_of
 
 
 @dataclass(frozen=True)
@@ -137,10 +138,10 @@ class StudyVerdict:
         if exceeded:
             threats = list(dict.fromkeys(exceeded))
             noun = "threat" if len(threats) == 1 else "threats"
-            limits = counted(len(exceeded), "load limit")
+            limits = count_of("load limit", len(exceeded))
             words.append(f"{limits} exceeded ({noun} {', '.join(threats)})")
         elif self.limits:
-            words.append(f"{counted(len(self.limits), 'load limit')} kept")
+            words.append(f"{count_of('load limit', len(self.limits))} kept")
         return "; ".join(words)
 
     @property
@@ -171,11 +172,6 @@ class StudyVerdict:
                 for each in self.sides
             )
             yield OtherGlass(glazing.title, _price(study, name), *words)
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun: `1 load limit`, `2 load limits`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _price(study: Study, glazing: str) -> float | None:

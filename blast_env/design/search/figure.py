@@ -9,7 +9,8 @@ from blast_env.evaluation import DesignProblem
 from blast_env.geometry import layout_counts
 from blast_env.plots.plan import QUIET_INK
 from blast_env.plots.site_plan import write_heading
-from blast_env.plots.style import count_of, number_on_axis, render_extra, unit_interval
+from blast_env.plots.style import number_on_axis, render_extra, unit_interval
+from blast_env.values import count_of
 
 with render_extra():
     from matplotlib.axes import Axes
