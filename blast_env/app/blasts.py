@@ -37,7 +37,7 @@ from blast_env.geometry import Layout
 from blast_env.layout.build_site import charge_against
 from blast_env.layout.placement import load_relevant
 from blast_env.plots.figures import save_figure
-from blast_env.plots.gas import Quantity, facades, full_load, gauge_history
+from blast_env.plots.gas import facades, full_load, gauge_history
 from blast_env.plots.ground_map import ground_map, ground_recorders, map_levels
 from blast_env.plots.pressure_film import record_planes, scale_end_kpa
 from blast_env.plots.pressure_frames import PressurePainter, PressureShot
@@ -75,7 +75,7 @@ class Scale(Kept):
 
 
 _SCALE: Final = "scale.json"
-_QUANTITIES: Final[tuple[Quantity, ...]] = ("peak", "impulse")
+_QUANTITIES: Final = ("peak", "impulse")
 
 
 def warm_engine() -> None:

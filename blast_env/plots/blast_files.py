@@ -123,11 +123,11 @@ class BlastFiles:
         from blast_env.plots.figures import save_figure
         from blast_env.plots.ground_map import ground_map, threshold_map
 
-        kind = gas.kind_of(self.quantity or "impulse")
+        quantity = self.quantity or "impulse"
         gauge = self.gauge or next((each.name for each in result.run.site.gauges), "")
         history = partial(gas.gauge_history, result, gauge, free_field=True, beside=unprotected)
         pictures = (
-            (self.heat_map, partial(gas.facades, result, quantity=kind, beside=unprotected)),
+            (self.heat_map, partial(gas.facades, result, quantity=quantity, beside=unprotected)),
             (self.history, history),
             (self.impulse_map, partial(ground_map, result, "impulse", unprotected)),
             (self.peak_map, partial(ground_map, result, "peak", unprotected)),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import dist
 from re import sub
 from textwrap import wrap
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -34,9 +34,6 @@ with render_extra():
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
-
-Quantity = Literal["impulse", "peak"]
-"""The quantity of a picture: the peak specific impulse, or the largest overpressure."""
 
 MINUS: Final = "\N{MINUS SIGN}"
 _PERCENT: Final = 100.0
@@ -88,14 +85,12 @@ KINDS: Final = {
 }
 
 
-def kind_of(quantity: str | Kind) -> Kind:
-    """Return the presentation of a quantity, or a given `Kind` unchanged.
+def kind_of(quantity: str) -> Kind:
+    """Return the presentation of a quantity.
 
     Raises:
         UnknownNameError: If there is no such quantity.
     """
-    if isinstance(quantity, Kind):
-        return quantity
     if quantity not in KINDS:
         raise UnknownNameError("quantity", quantity, KINDS)
     return KINDS[quantity]
@@ -174,7 +169,7 @@ values decrease to the right."""
 def facades(
     result: GasResult,
     structure: str | None = None,
-    quantity: Quantity | Kind = "impulse",
+    quantity: str = "impulse",
     beside: GasResult | None = None,
     full: float | None = None,
 ) -> Figure:
@@ -188,8 +183,7 @@ def facades(
         structure: Name of the structure, or of a building: its parts are unfolded as one, and where
             one wall of it is behind another, the larger load is shown. The protected building with
             the largest impulse without it.
-        quantity: `"impulse"`, peak specific impulse in Pa s, or `"peak"`, overpressure in kPa;
-            or how else one is drawn.
+        quantity: `"impulse"`, peak specific impulse in Pa s, or `"peak"`, overpressure in kPa.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
         full: End of the scale, for comparisons of figures; see `full_load`. By default the load
@@ -241,7 +235,7 @@ def _row_words(blast: GasBlast) -> str:
     return "\n".join(wrap(kept_together, _ROW_LETTERS))
 
 
-def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
+def full_load(result: GasResult, structure: str, quantity: str) -> float:
     """Return the end of the scale of `facades` for a structure, in Pa s or kPa.
 
     Raises:
@@ -411,52 +405,20 @@ def gauge_history(
     """
     results = both_results(result, beside)
     figure = Figure(figsize=(8.6, 6.8), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    panels = upper, lower = figure.subplots(2, 1, sharex=True)
     end_s = max(each.time_s for each in results)
     for each in results:
-        of_result = each is result
-        colour = _MAIN if of_result else _BESIDE
-        history = each.history(gauge)
-        row = each.gauges.set_index("name").loc[gauge]
-        time_s, overpressure = history["time_s"].to_numpy(), history["overpressure_pa"].to_numpy()
-        # Ambient pressure before the first sample.
-        time_s = np.concatenate(([0.0, 2.0 * time_s[0] - time_s[1]], time_s))
-        overpressure = np.concatenate(([0.0, 0.0], overpressure))
-        words = barrier_text(each.blast.layout)
-        _draw_wave(
-            (upper, lower),
-            (time_s, overpressure, impulses(time_s, overpressure)),
-            (
-                f"{words}: peak {_figures(row['peak_pa'] / PA_PER_KPA)} kPa",
-                f"{words}: {_figures(row['impulse_pa_s'])} Pa·s",
-            ),
-            color=colour,
-            linestyle="-" if of_result else "--",
-            linewidth=1.8,
-        )
-    own = result.gauges[result.gauges["name"] == gauge]
-    x_m, y_m, z_m = own[["x_m", "y_m", "z_m"]].to_numpy()[0]
-    place = (float(x_m), float(y_m), float(z_m))
+        colour, style = (_MAIN, "-") if each is result else (_BESIDE, "--")
+        _draw_history(panels, each, gauge, color=colour, linestyle=style, linewidth=1.8)
+    own = result.gauges.set_index("name").to_dict("index")[gauge]
+    place = own["x_m"], own["y_m"], own["z_m"]
     if free_field:
-        wave, words = _free_field(result, place)
-        time_s = np.unique([*np.linspace(0.0, end_s, 2000), wave.arrival_s, wave.arrival_s - 1e-9])
-        _draw_wave(
-            (upper, lower),
-            (time_s, wave.pressure(time_s), wave.impulse_until(time_s)),
-            (
-                f"{words}: peak {_figures(wave.peak / PA_PER_KPA)} kPa",
-                f"{words}: {_figures(wave.impulse())} Pa·s",
-            ),
-            color=_REFERENCE,
-            linestyle=(0, (1.2, 1.2)),
-            linewidth=1.6,
-        )
+        _draw_free_field(panels, result, place, end_s)
     upper.axhline(0.0, color=unit_interval(QUIET_INK), linewidth=0.8, zorder=1)
     upper.set_ylabel("overpressure (kPa)")
-    lower.set_ylabel("impulse up to then (Pa·s)")
-    lower.set_xlabel("time since the detonation (ms)")
+    lower.set(ylabel="impulse up to then (Pa·s)", xlabel="time since the detonation (ms)")
     lower.set_xlim(0.0, end_s * MS_PER_S)
-    for axes in (upper, lower):
+    for axes in panels:
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(fontsize=9, frameon=False, loc="best")
@@ -466,16 +428,45 @@ def gauge_history(
     return figure
 
 
+def _draw_history(panels: tuple[Axes, Axes], result: GasResult, gauge: str, **style: Any) -> None:
+    """Draw what a gauge has recorded, after the ambient pressure before the first sample."""
+    history, row = result.history(gauge), result.gauges.set_index("name").to_dict("index")[gauge]
+    time_s, overpressure = history["time_s"].to_numpy(), history["overpressure_pa"].to_numpy()
+    time_s = np.concatenate(([0.0, 2.0 * time_s[0] - time_s[1]], time_s))
+    overpressure = np.concatenate(([0.0, 0.0], overpressure))
+    wave = time_s, overpressure, impulses(time_s, overpressure)
+    loads = row["peak_pa"], row["impulse_pa_s"]
+    _draw_wave(panels, wave, barrier_text(result.blast.layout), loads, **style)
+
+
+def _draw_free_field(
+    panels: tuple[Axes, Axes], result: GasResult, place: tuple[float, float, float], end_s: float
+) -> None:
+    """Draw Kingery and Bulmash's incident wave at a place."""
+    wave, words = _free_field(result, place)
+    time_s = np.unique([*np.linspace(0.0, end_s, 2000), wave.arrival_s, wave.arrival_s - 1e-9])
+    drawn = time_s, wave.pressure(time_s), wave.impulse_until(time_s)
+    loads = float(wave.peak), float(wave.impulse())
+    style = {"color": _REFERENCE, "linestyle": (0, (1.2, 1.2)), "linewidth": 1.6}
+    _draw_wave(panels, drawn, words, loads, **style)
+
+
 def _draw_wave(
     panels: tuple[Axes, Axes],
     wave: tuple[FloatArray, FloatArray, FloatArray],
-    labels: tuple[str, str],
+    words: str,
+    loads: tuple[float, float],
     **style: Any,
 ) -> None:
-    """Draw the overpressures and impulses of a wave, Pa and Pa s, over its times in s."""
+    """Draw the overpressures and impulses of a wave, Pa and Pa s, over its times in s.
+
+    The legend has its name, peak and impulse.
+    """
     time_s, overpressure_pa, impulse_pa_s = wave
-    panels[0].plot(MS_PER_S * time_s, overpressure_pa / PA_PER_KPA, label=labels[0], **style)
-    panels[1].plot(MS_PER_S * time_s, impulse_pa_s, label=labels[1], **style)
+    peak = f"{words}: peak {_figures(loads[0] / PA_PER_KPA)} kPa"
+    panels[0].plot(MS_PER_S * time_s, overpressure_pa / PA_PER_KPA, label=peak, **style)
+    impulse = f"{words}: {_figures(loads[1])} Pa·s"
+    panels[1].plot(MS_PER_S * time_s, impulse_pa_s, label=impulse, **style)
 
 
 def _free_field(result: GasResult, place: tuple[float, float, float]) -> tuple[Friedlander, str]:

@@ -16,7 +16,6 @@ from blast_env.gas.spherical_stage import SphericalStage, spherical_stage
 from blast_env.particles.calibration.references import Burst, burst_of, kingery_bulmash
 from blast_env.particles.calibration.references import Quantity as CurveQuantity
 from blast_env.plots.gas import (
-    Quantity,
     both_results,
     gas_heading,
     kind_of,
@@ -80,7 +79,7 @@ def ground_recorders(grid: GasGrid) -> tuple[GroundMap, ...]:
     return (GroundMap(grid),)
 
 
-def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
+def ground_values(result: GasResult, quantity: str) -> FloatArray:
     """Return a quantity in the lowest cells of the whole grid (nx, ny), NaN in solids.
 
     Near a charge on the ground it includes the spherical stage before the grid took over.
@@ -113,7 +112,7 @@ def _distances_m(grid: GasGrid, opening: SphericalStage) -> FloatArray:
     return np.asarray(np.sqrt(across**2 + along**2 + (grid.centres_m(2)[0] - z_m) ** 2))
 
 
-def map_levels(result: GasResult, quantity: Quantity) -> tuple[float, ...]:
+def map_levels(result: GasResult, quantity: str) -> tuple[float, ...]:
     """Return the contour levels of `ground_map`, in Pa s or kPa, for use in further maps.
 
     Raises:
@@ -126,7 +125,7 @@ def map_levels(result: GasResult, quantity: Quantity) -> tuple[float, ...]:
 
 def ground_map(
     result: GasResult,
-    quantity: Quantity = "peak",
+    quantity: str = "peak",
     beside: GasResult | None = None,
     levels: Sequence[float] | None = None,
 ) -> Figure:

@@ -90,8 +90,8 @@ def blast_pictures(unprotected: MeasuredBlast, protected: MeasuredBlast) -> tupl
         if not target.protected or target.name not in protected.loads:
             continue
         pictures.append(_history(unprotected, protected, target))
-        for kind in KINDS.values():
-            figure = facades(protected.result, target.name, kind, unprotected.result)
+        for quantity, kind in KINDS.items():
+            figure = facades(protected.result, target.name, quantity, unprotected.result)
             pictures.append((f"{target.name}: {kind.name}, walls unfolded", png(figure)))
     return tuple(pictures)
 

@@ -153,7 +153,7 @@ def test_a_map_needs_its_recorder(blast: GasBlast, protected: GasResult) -> None
         ground_map(run)
     assert any(isinstance(each, GroundMap) for each in protected.run.solver.recorders)
     with pytest.raises(UnknownNameError, match="did you mean 'peak'"):
-        ground_map(protected, "peek")  # type: ignore[arg-type]
+        ground_map(protected, "peek")
 
 
 def test_only_the_same_charge_can_stand_beside(unprotected: GasResult) -> None:
