@@ -59,15 +59,13 @@ def impulse_over_time(result: BlastResult) -> Figure:
     columns = min(len(shown), 3 if len(shown) > 4 else 2)
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(max(4.6 * columns, 8.0), 1.2 + 3.6 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    panels = [figure.add_subplot(rows, columns, k + 1) for k in range(len(shown))]
     table = result.collisions.assign(facade=faces_hit(result.collisions))
     end_ms = shown_until_s(result) * MS_PER_S
     unit = result.load_unit
-    for axes, obstacle in zip(panels, shown, strict=False):
+    for axes, obstacle in zip(panels, shown, strict=True):
         hits = table[table["structure"] == obstacle.name]
         _draw_structure(axes, obstacle, hits, end_ms, unit.factor_of(obstacle.name))
-    for axes in panels[len(shown) :]:
-        axes.set_visible(False)
     title, subtitle = blast_title(result.blast)
     write_heading(figure, f"{title}: impulse over time", subtitle)
     later = table.loc[table["time_s"] * MS_PER_S > end_ms, "impulse_sim"].sum()
@@ -115,7 +113,6 @@ def _draw_structure(
     role = " (protected)" if obstacle.protected else ""
     axes.set_title(f"{obstacle.name}{role}", fontsize=11)
     axes.set_xlabel("time (ms)")
-    axes.xaxis.set_tick_params(labelbottom=True)
     axes.set_ylabel(f"cumulative impulse ({'simulation units' if factor is None else 'Pa s'})")
     axes.yaxis.set_major_formatter(FuncFormatter(number_on_axis))
     axes.grid(alpha=0.25)

@@ -56,11 +56,8 @@ def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: 
     size_in = (width_in * columns + (2.0 if columns == 1 else 0.0), height_in * lines + 1.5)
     figure = Figure(figsize=size_in, layout="constrained")
     figure.suptitle(title)
-    panels = figure.subplots(lines, columns, squeeze=False).ravel()
-    for axes, (component, members) in zip(panels, groups, strict=False):
-        _draw(axes, component, members, rows)
-    for axes in panels[len(groups) :]:
-        axes.set_visible(False)
+    for number, (component, members) in enumerate(groups, start=1):
+        _draw(figure.add_subplot(lines, columns, number), component, members, rows)
     handles: list[Artist] = [
         Patch(facecolor=LEVEL_COLOURS[level], edgecolor="0.4", label=level.label)
         for level in reversed(LevelOfProtection)

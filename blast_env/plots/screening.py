@@ -50,7 +50,7 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
     rows = -(-count // columns)
     size_in = (_PANEL_IN * columns + 0.4, (_PANEL_IN + 0.9) * rows + 0.9)
     figure = Figure(figsize=size_in, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    panels = [figure.add_subplot(rows, columns, k + 1) for k in range(count)]
     features = site_features(scenario, layout)
     names = {each.filled.bay.structure for each in found.threats[0].bays}
     facades = shapely.union_all(
@@ -61,7 +61,7 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
             if each.name in names
         ]
     )
-    for axes, threat in zip(panels, found.threats, strict=False):
+    for axes, threat in zip(panels, found.threats, strict=True):
         draw_plan(axes, [each for each in features if each.kind is Kinds.SITE])
         _draw_rings(axes, scenario, facades, found, threat)
         for each in scenario.structures_with(layout):
@@ -70,14 +70,12 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
         draw_features(axes, without(features, Kinds.SITE))
         draw_features(axes, [charge_feature(threat.charge, "worst place")])
         axes.set_title(f"{threat.name}, {threat.charge.tnt_kg:g} kg TNT", fontsize=11)
-    for axes in panels[count:]:
-        axes.set_visible(False)
     write_heading(
         figure,
         f"{scenario.name}: level of protection by the place of a charge",
         "Kingery and Bulmash in the open, at right angles; no shielding, no echoes",
     )
-    for axes in panels[:count]:
+    for axes in panels:
         write_names(axes, without(features, Kinds.CHARGE_PLACE, Kinds.GAUGE))
     return figure
 
