@@ -30,7 +30,7 @@ MOST_KEEP_OUTS: Final = 100
 """Most no-build areas of a scenario."""
 
 MOST_AREAS: Final = 1000
-"""Most outlines of a zone, or of no-build areas."""
+"""Most outlines of a zone, of no-build areas, or of places of charges."""
 
 _COARSER: Final = (1, 2, 3, 4, 6, 8)
 """Candidate sides of the blocks of no-build areas, in modules."""
@@ -70,7 +70,7 @@ def charge_sources(
     """
     free = _free(site, buildings, radius_m)
     asked = list(_asked(site, free))
-    things, most = _places_of_charges(site), MOST_SOURCES - len(asked)
+    things, most = _on_site(site, Role.CHARGE), MOST_SOURCES - len(asked)
     sources, has_kerbs = _fewest(site, things, free, most), True
     if len(sources) > most and any(each.width_m for each in things):
         has_kerbs = False
@@ -108,23 +108,6 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
         [shapely.box(*each.grown(gap_m)) for building in buildings for each in building.boxes_m]
     )
     return shapely.difference(inside, built)
-
-
-def _places_of_charges(site: PlacedSite) -> list[Thing]:
-    """Return the places of charges, with the outlines of areas repaired and cut at the border.
-
-    Raises:
-        BlastEnvError: If the outlines are too long, or one crosses itself too often.
-    """
-    things, areas = [], []
-    for thing in site.of_role(Role.CHARGE):
-        if shapely.get_dimensions(thing.geometry) == 2:
-            outline = mended(thing.geometry, f"{site.path}: {thing.place}: the outline")
-            areas.append(shapely.intersection(outline, site.box))
-            thing = replace(thing, geometry=areas[-1])
-        things.append(thing)
-    check_outlines(areas, f"{site.path}: areas of charges")
-    return things
 
 
 def _fewest(
@@ -216,13 +199,11 @@ def build_zone(site: PlacedSite, buildings: Sequence[FittedBuilding]) -> dict[st
     elif options.zone_around_m is not None:
         chosen = [each for own in buildings if own.protected for each in own.boxes_m]
         around = Rectangle.around(chosen).grown(options.zone_around_m)
-        width_m, height_m = site.size_m
-        low, high = (max(around.left, 0.0), max(around.bottom, 0.0)), (around.right, around.top)
-        cut = Rectangle(*low, min(high[0], width_m), min(high[1], height_m))
+        cut = Rectangle(*shapely.intersection(shapely.box(*around), site.box).bounds)
         inside[_window(site, cut, "--zone-around")] = True
     elif site.of_role(Role.ZONE):
-        for _, outline in _on_site(site, Role.ZONE):
-            inside |= cells_of(outline, site.shape)
+        for each in _on_site(site, Role.ZONE):
+            inside |= cells_of(each.geometry, site.shape)
     elif options.zone_from:
         raise BlastEnvError(
             f"{site.path}: nothing on the site is chosen by --zone-from {options.zone_from}"
@@ -253,9 +234,10 @@ def _keep_outs(
     areas = [
         (
             (each.name or "no-build area of the map")[:_MOST_REASON],
-            outline.buffer(reach_m, join_style="mitre"),
+            each.geometry.buffer(reach_m, join_style="mitre"),
         )
-        for each, outline in _on_site(site, Role.KEEP_OUT)
+        for each in _on_site(site, Role.KEEP_OUT)
+        if each.geometry.area
     ]
     first = window[0].start, window[1].start
     for side in _COARSER:
@@ -274,25 +256,27 @@ def _keep_outs(
     )
 
 
-def _on_site(site: PlacedSite, role: Role) -> list[tuple[Thing, BaseGeometry]]:
-    """Return the areas of a role, each with the part of its outline on the site.
+def _on_site(site: PlacedSite, role: Role) -> list[Thing]:
+    """Return the objects of a role, areas with sound outlines that are cut at the border.
 
     Raises:
-        BlastEnvError: If they are too many or too long, or one crosses itself too often.
+        BlastEnvError: If there are too many areas, or too long ones, or one crosses itself too
+            often.
     """
-    found = []
+    things, areas = [], []
     for thing in site.of_role(role):
-        what = f"{site.path}: {thing.place}: the outline"
-        inside = shapely.intersection(mended(thing.geometry, what), site.box)
-        if inside.area > 0.0:
-            found.append((thing, inside))
-    if len(found) > MOST_AREAS:
+        if shapely.get_dimensions(thing.geometry) == 2:
+            outline = mended(thing.geometry, f"{site.path}: {thing.place}: the outline")
+            thing = replace(thing, geometry=shapely.intersection(outline, site.box))
+            areas += [thing.geometry] if thing.geometry.area else []
+        things.append(thing)
+    if len(areas) > MOST_AREAS:
         raise BlastEnvError(
-            f"{site.path}: there are {len(found)} outlines of a {role} on the site, must be at "
+            f"{site.path}: there are {len(areas)} outlines of a {role} on the site, must be at "
             f"most {MOST_AREAS}"
         )
-    check_outlines([outline for _, outline in found], f"{site.path}: outlines of a {role}")
-    return found
+    check_outlines(areas, f"{site.path}: outlines of a {role}")
+    return things
 
 
 def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, slice]:
@@ -317,7 +301,7 @@ def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, sl
 def cells_of(outline: BaseGeometry, shape: tuple[int, int]) -> BoolArray:
     """Return where an outline, in m from the grid's corner, has the centre of a module."""
     cells = np.zeros(shape, dtype=bool)
-    if outline.is_empty:
+    if not outline.area:
         return cells
     bounds = np.array(outline.bounds) / MODULE_SIDE_M
     left, bottom, right, top = (max(int(each), 0) for each in (*bounds[:2], *np.ceil(bounds[2:])))

@@ -312,10 +312,12 @@ def _fault(feature: MapFeature, role: Role) -> str:
     if role in (Role.BUILDING, Role.CHARGE) and "kind" not in tags:
         with suppress(ValueError):  # the layer of a drawing is a name
             is_below = is_below or float(str(tags.get("layer", "0"))) < 0.0
+    is_point = feature.geometry.geom_type in ("Point", "MultiPoint")
+    if role in (Role.ZONE, Role.KEEP_OUT) and is_point:
+        return "build zones and no-build areas without an outline"
     if role is Role.BUILDING:
         if is_below:
             return "buildings below the ground"
-        is_point = feature.geometry.geom_type in ("Point", "MultiPoint")
         if is_point and _diameter_m(feature) is None:
             return "buildings without an outline or a diameter"
     if role is Role.CHARGE:

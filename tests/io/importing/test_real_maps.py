@@ -349,6 +349,13 @@ def test_widths_of_streets_are_those_of_their_lanes_or_guessed(tmp_path: Path) -
     assert near == pytest.approx([9.0, 15.0, 25.0, 35.0, 48.0, 52.0], rel=0.01)
 
 
+def test_a_no_build_area_without_an_outline_is_named(tmp_path: Path) -> None:
+    tree = charge(3.0, 9.0) | {"properties": {"kind": "keep_out", "name": "tree"}}
+    site = imported(written(tmp_path, HOUSE, tree, PLACE), zone_around_m=8.0)
+    assert not site.scenario.zone.keep_outs
+    assert places(entries(site, Deed.LEFT_OUT, "without an outline")) == ["features[1]"]
+
+
 def test_a_lane_too_near_to_a_building_is_named(tmp_path: Path) -> None:
     lane = street(-0.1, width="2")
     lane["geometry"]["coordinates"] = [[1, -0.1], [5, -0.1]]
