@@ -1,6 +1,6 @@
 """The proposals of the package for a site: `blast_env.propose` and `blast_env.search`."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.design.search.problem import Proposer, Report, SearchResult
+from blast_env.design.search.problem import Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
 from blast_env.errors import BlastEnvError
@@ -44,22 +44,18 @@ LEAST_PIECE_GAIN: Final = 0.001
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """The proposer for a site.
+class PackageProposer:
+    """Proposes the best layout for a site by the surrogate of gas dynamics, without a blast.
 
-    Attributes:
-        proposer: The proposer.
-        by: Description of its basis.
-        source: Identification of the surrogate, for the reproduction.
+    The surrogate was fitted to generated sites. Single modules are to it a catalogue of one item.
     """
 
-    proposer: Proposer
-    by: str
-    source: Mapping[str, str]
+    name: str = "package"
 
     def propose(
         self,
         problem: DesignProblem,
+        budget: int = 0,
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
@@ -70,11 +66,15 @@ class Chosen:
 
         Args:
             problem: The problem.
+            budget: Most blasts, none of which is spent.
             seed: Seed of all random draws.
             report: Called with the progress.
         """
-        result = self.proposer.propose(problem, 0, seed, report)
-        by, guesses = self.by, _guesses(problem)
+        # Imported here because the import takes half a second.
+        from blast_env.design.surrogate import packaged_surrogate, search_by
+
+        result = search_by(packaged_surrogate()).propose(problem, 0, seed, report)
+        by, guesses = "the surrogate of gas dynamics", _guesses(problem)
         rules = layouts_by_rule(problem.scenario, problem.known_charge)
         layout = worth_its_pieces(guesses, result.layout, rules.values())
         gain = reductions(*guesses.loads([layout, ()])).item()
@@ -84,7 +84,7 @@ class Chosen:
                 f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_what_helps(problem)}"
             )
             layout, gain = (), 0.0
-        return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
+        return replace(result, method=self.name, by=by, layout=layout, gain=gain, budget=budget)
 
 
 def _what_helps(problem: DesignProblem) -> str:
@@ -149,33 +149,6 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     return best
 
 
-def chosen_proposer() -> Chosen:
-    """Return the proposer of the package: the surrogate, which was fitted to generated sites.
-
-    Single modules are to it a catalogue of one item.
-    """
-    # Imported here because the import takes half a second.
-    from blast_env.design.surrogate import packaged_surrogate, search_by
-
-    surrogate = packaged_surrogate()
-    known = {"surrogate": surrogate.digest}
-    return Chosen(search_by(surrogate), "the surrogate of gas dynamics", known)
-
-
-@dataclass(frozen=True)
-class PackageProposer:
-    """Proposes the package's best layout for a site; see `chosen_proposer`."""
-
-    name: str = "package"
-
-    def propose(
-        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
-    ) -> SearchResult:
-        """Return the layout, with its source in `by`; it spends no blasts."""
-        found = chosen_proposer().propose(problem, seed, report)
-        return replace(found, budget=budget)
-
-
 def propose(
     scenario: AnyScenario,
     charge: AnyCharge | None = None,
@@ -185,7 +158,7 @@ def propose(
 ) -> SearchResult:
     """Return the layout that the package proposes for a site.
 
-    This takes seconds, and no blast; see `chosen_proposer`.
+    This takes seconds, and no blast; see `PackageProposer`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
@@ -200,7 +173,7 @@ def propose(
         BlastEnvError: If the scenario has no build zone or no protected structure.
     """
     problem = problem_of(scenario, charge, processes)
-    return chosen_proposer().propose(problem, report=report)
+    return PackageProposer().propose(problem, report=report)
 
 
 def search(
