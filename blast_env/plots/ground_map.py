@@ -32,10 +32,10 @@ from blast_env.plots.plan import (
 )
 from blast_env.plots.site_plan import (
     add_bar,
-    add_outline,
     draw_features,
     draw_plan,
     legend_of,
+    rectangle_patch,
     trim_height,
     write_heading,
     write_legend,
@@ -227,13 +227,11 @@ def _plans(results: Sequence[GasResult]) -> tuple[Figure, Sequence[Axes]]:
 
 
 def _draw_standing(axes: Axes, result: GasResult) -> None:
-    """Draw the features of a site over its ground, and set the limits of the axes."""
-    site_m = result.run.site.site_m
+    """Draw the features of a site over its ground, and its border."""
     draw_features(axes, without(_features(result), Kinds.SITE))
-    add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
-    reach = 0.03 * max(site_m.right, site_m.top)
-    axes.set_xlim(site_m.left - reach, site_m.right + reach)
-    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+    border = rectangle_patch(result.run.site.site_m)
+    border.set(fill=False, edgecolor=unit_interval(BORDER), linewidth=1.8)
+    axes.add_patch(border)
 
 
 def _add_circle(axes: Axes, charge: Charge, radius_m: float, **style: Any) -> None:

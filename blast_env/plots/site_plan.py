@@ -20,7 +20,6 @@ from blast_env.plots.plan import (
     FeatureKind,
     Kinds,
     Look,
-    area_feature,
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
 from blast_env.site.blast_site import StructureOutline
@@ -67,28 +66,19 @@ def add_bar(
     return bar
 
 
+_MARGIN: Final = 0.03  # around a site, of its longer side
+
+
 def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
     """Return a rectangle as a patch without a style."""
     left, bottom, right, top = rectangle
     return RectanglePatch((left, bottom), right - left, top - bottom)
 
 
-def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> Artist:
-    """Add the outline of a rectangle in metres; `style` is passed to matplotlib."""
-    patch = rectangle_patch(rectangle)
-    patch.set(**({"fill": False} | style))
-    return axes.add_patch(patch)
-
-
-def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
-    """Set up axes in metres with equal scales and draw ground and border."""
-    draw_plan(axes, [area_feature(Kinds.SITE, site_m, "site")], margin)
-
-
-def draw_plan(axes: Axes, features: Sequence[Feature], margin: float = 0.03) -> None:
+def draw_plan(axes: Axes, features: Sequence[Feature]) -> None:
     """Set up axes in metres with equal scales for a site, and draw its features."""
     (site_m,) = (each.bounds_m for each in features if each.kind is Kinds.SITE)
-    reach = margin * max(site_m.right, site_m.top)
+    reach = _MARGIN * max(site_m.right, site_m.top)
     axes.set_xlim(site_m.left - reach, site_m.right + reach)
     axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
     axes.set_aspect("equal")
