@@ -13,11 +13,8 @@ from blast_env.particles.scene import Scene
 from blast_env.particles.structure import ModularObstacle
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.plan import (
-    BARRIER,
     EXPLOSIVE,
-    PROTECTED,
     STANDING,
-    STRUCTURE,
     Kinds,
     blast_features,
     without,
@@ -26,7 +23,7 @@ from blast_env.plots.site_plan import (
     draw_features,
     draw_loads,
     draw_outlines,
-    legend_of,
+    legend_of_loads,
     load_colours,
     show_loads,
     write_names,
@@ -47,7 +44,6 @@ with render_extra():
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.colors import Normalize
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
 _SMALLEST_RADIUS_PX: Final = 2.0
 _SMALLEST_RIMMED_PX: Final = 3.5
@@ -103,7 +99,9 @@ class FramePainter:
         self._unit = unit
         features = blast_features(blast.scenario, blast.layout, scene.charge)
         on_ground = without(features, Kinds.SITE, *STANDING)
-        handles = [*_signs(scene), *legend_of(on_ground)]
+        destructible = any(each.capacity is not None for each in scene.structures)
+        shown = without(features, Kinds.SITE)
+        handles = [*_signs(scene), *legend_of_loads(shown, destructible=destructible)]
         colours = ScalarMappable(Normalize(0.0, unit.factor * full_impulse), load_colours())
         usual_title, usual_subtitle = blast_title(blast)
         self.sheet = SiteSheet(
@@ -202,6 +200,7 @@ def _ball(kind: CollisionType) -> Line2D:
 
 
 def _signs(scene: Scene) -> list[Artist]:
+    """Return the legend entries of the balls."""
     kinds = {"explosive ball": CollisionType.ExplosionBall}
     if scene.parameters.air.spacing_units > 0.0:
         kinds["air ball"] = CollisionType.AirBall
@@ -209,18 +208,4 @@ def _signs(scene: Scene) -> list[Artist]:
     for label, kind in kinds.items():
         signs.append(_ball(kind))
         signs[-1].set_label(label)
-    outlines = {}
-    for each in scene.structures:
-        if each.is_barrier:
-            outlines["barrier module"] = (BARRIER, 1.0)
-        elif each.protected:
-            outlines[Kinds.PROTECTED_STRUCTURE.words] = (PROTECTED, 2.0)
-        else:
-            outlines[Kinds.STRUCTURE.words] = (STRUCTURE, 1.4)
-    for label, (colour, width) in outlines.items():
-        edge = unit_interval(colour)
-        signs.append(Patch(facecolor="white", edgecolor=edge, linewidth=width, label=label))
-    if any(each.capacity is not None for each in scene.structures):
-        cross = Line2D([], [], marker="x", linestyle="", color="black", label="destroyed module")
-        signs.append(cross)
     return signs

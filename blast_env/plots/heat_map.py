@@ -11,12 +11,10 @@ from blast_env.evaluation.engines import BlastResult
 from blast_env.geometry import Rectangle
 from blast_env.particles.structure import ModularObstacle, ModularPart
 from blast_env.plots.plan import (
-    BARRIER,
     INK,
     PROTECTED,
     STANDING,
     Feature,
-    Kinds,
     blast_features,
     without,
 )
@@ -25,7 +23,7 @@ from blast_env.plots.site_plan import (
     draw_loads,
     draw_outlines,
     draw_plan,
-    legend_of,
+    legend_of_loads,
     load_colours,
     write_heading,
     write_legend,
@@ -48,8 +46,6 @@ with render_extra():
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
 _HEIGHT_IN = 6.6
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
@@ -132,7 +128,8 @@ def heat_map(result: BlastResult, among: Sequence[BlastResult] = ()) -> Figure:
     for axes, building in zip(panels, chosen, strict=True):
         _draw_panel(axes, result, building, scale, room_in)
     _add_colour_bar(figure, panels, scale, result)
-    _add_legend(figure, result)
+    destructible = any(each.capacity is not None for each in result.obstacles)
+    write_legend(figure, legend_of_loads(_features(result), destructible=destructible))
     title, subtitle = blast_title(result.blast)
     write_heading(figure, f"{title}: impulse per module", subtitle)
     write_names(overview, _features(result), inside=False)
@@ -271,18 +268,6 @@ def _write_numbers(axes: Axes, building: _Building, scale: LoadScale, size_pt: f
             if part.destroyed:  # keep the cross off the number
                 ground = load_colours()(scale.norm(load))
                 number.set_bbox({"facecolor": ground, "edgecolor": "none", "pad": 1.5})
-
-
-def _add_legend(figure: Figure, result: BlastResult) -> None:
-    features = _features(result)
-    handles = legend_of(without(features, Kinds.BARRIER))
-    if any(each.kind is Kinds.BARRIER for each in features):
-        edge = unit_interval(BARRIER)
-        handles.insert(0, Patch(fill=False, edgecolor=edge, label="barrier module"))
-    if any(obstacle.capacity is not None for obstacle in result.obstacles):
-        ink = unit_interval(INK)
-        handles.append(Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed"))
-    write_legend(figure, handles)
 
 
 def _add_colour_bar(

@@ -20,6 +20,7 @@ from blast_env.plots.plan import (
     FeatureKind,
     Kinds,
     Look,
+    without,
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
 from blast_env.site.blast_site import StructureOutline
@@ -170,6 +171,25 @@ def legend_of(features: Iterable[Feature]) -> list[Artist]:
     shown = {(feature.title, min(len(feature.places_m), 3)): feature for feature in features}
     ordered = sorted(shown.values(), key=lambda feature: -feature.kind.level)
     return [_legend_entry(feature) for feature in ordered]
+
+
+def legend_of_loads(features: Iterable[Feature], *, destructible: bool) -> list[Artist]:
+    """Return the legend entries for a picture of the loads on modules.
+
+    Args:
+        features: The features of the site.
+        destructible: Whether modules can be destroyed.
+    """
+    features = tuple(features)
+    handles = legend_of(without(features, Kinds.BARRIER))
+    if any(each.kind is Kinds.BARRIER for each in features):
+        edge = unit_interval(BARRIER)
+        handles.insert(0, Patch(fill=False, edgecolor=edge, label="barrier module"))
+    if destructible:
+        ink = unit_interval(INK)
+        sign = Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed module")
+        handles.append(sign)
+    return handles
 
 
 def _legend_entry(feature: Feature) -> Artist:
