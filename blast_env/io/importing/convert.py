@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.files import read_regular
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
@@ -23,7 +24,7 @@ from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite, place_site
-from blast_env.io.importing.site_map import SiteMap, check_file
+from blast_env.io.importing.site_map import MOST_BYTES, SiteMap
 from blast_env.io.importing.things import Role, things_of
 from blast_env.provenance import package_version
 from blast_env.reading import read_apart
@@ -149,7 +150,7 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",
-        "description": _description(site, buildings),
+        "description": _description(site_map, site, buildings),
         "import_notes": [STEERING.sub(" ", each) for each in notes],
         "site": {"width_m": site.size_m[0], "height_m": site.size_m[1]},
         "charge": sources,
@@ -209,14 +210,18 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read, is too large, or has an unknown suffix.
     """
-    name, site_map = path.name.lower(), SiteMap(path, options)
-    for suffix, reader in _READERS.items():
-        if name.endswith(suffix):
-            check_file(path)
-            reader(site_map)
-            site_map.check_coordinates()
-            return site_map
-    raise BlastEnvError(f"{path}: suffix is {path.suffix!r}, must be one of {', '.join(_READERS)}")
+    reader = next((_READERS[each] for each in _READERS if path.name.lower().endswith(each)), None)
+    if reader is None:
+        known = ", ".join(_READERS)
+        raise BlastEnvError(f"{path}: suffix is {path.suffix!r}, must be one of {known}")
+    try:
+        content = read_regular(path, MOST_BYTES)
+    except BlastEnvError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
+    site_map = SiteMap(path, content, options)
+    reader(site_map)
+    site_map.check_coordinates()
+    return site_map
 
 
 def _structures(
@@ -278,9 +283,9 @@ def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
     }
 
 
-def _description(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> str:
+def _description(site_map: SiteMap, site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
-    digest = hashlib.sha256(site.path.read_bytes()).hexdigest()[:_HASH_DIGITS]
+    digest = hashlib.sha256(site_map.content).hexdigest()[:_HASH_DIGITS]
     worst = max(buildings, key=lambda each: each.deviation.area_share)
     farthest = max(buildings, key=lambda each: each.deviation.outline_m)
     protected = ", ".join(each.name for each in buildings if each.protected)

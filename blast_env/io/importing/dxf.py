@@ -84,7 +84,8 @@ def read_dxf(site_map: SiteMap) -> None:
         BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
     """
     path, options = site_map.path, site_map.options
-    check_count(path, path.read_bytes().count(b"\n"), MOST_LINES, "lines of text")
+    site_map.has_layers = True
+    check_count(path, site_map.content.count(b"\n"), MOST_LINES, "lines of text")
     with errors_of("ezdxf", path, "DXF"):
         document = _document(site_map)
         _set_scales(site_map, document)

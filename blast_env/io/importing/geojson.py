@@ -44,7 +44,7 @@ def read_geojson(site_map: SiteMap) -> None:
     """
     path, options = site_map.path, site_map.options
     options.refuse("GeoJSON, whose coordinates --crs is about", "units")
-    document = _parsed(path)
+    document = _parsed(path, site_map.content)
     listed = _listed_features(path, document)
     for index in range(len(listed)):
         item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
@@ -53,17 +53,14 @@ def read_geojson(site_map: SiteMap) -> None:
     site_map.crs = None if crs == LOCAL else crs
 
 
-def _parsed(path: Path) -> Mapping[str, Any]:
+def _parsed(path: Path, content: bytes) -> Mapping[str, Any]:
+    values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
+    check_count(path, values, MOST_VALUES, "commas and opening brackets")
     try:
-        content = path.read_bytes()
-        values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
-        check_count(path, values, MOST_VALUES, "commas and opening brackets")
         document = json.loads(content)
     except RecursionError as error:
         raise BlastEnvError(f"{path}: is nested too deeply") from error
-    except BlastEnvError:
-        raise
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         raise BlastEnvError(f"{path}: is not JSON: {shortened(str(error), 300)}") from error
     if not isinstance(document, dict):
         raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
@@ -84,8 +81,7 @@ def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
         return [{"type": "Feature", "geometry": document, "properties": {}}]
     raise BlastEnvError(
         f"{path}: type is {value_text(kind)}, must be 'FeatureCollection', 'Feature' or that of a "
-        f"geometry: "
-        "is it GeoJSON?"
+        "geometry: is it GeoJSON?"
     )
 
 

@@ -60,27 +60,26 @@ class SiteMap:
 
     Attributes:
         path: The file.
+        content: Its content.
         options: Options of the import.
         ledger: The ledger of the import.
         crs: Reference system of its coordinates, as pyproj reads it; x is easting or longitude.
             `None` for a drawing, whose place on the Earth is unknown.
         unit_m: Length of the unit of a drawing, m.
+        has_layers: Whether its objects have layers instead of tags.
         features: All outlines, lines and points; texts are points.
         points: Number of their points.
     """
 
     path: Path
+    content: bytes
     options: ImportOptions
     ledger: Ledger = field(default_factory=Ledger)
     crs: str | None = None
     unit_m: float = 1.0
+    has_layers: bool = False
     features: list[MapFeature] = field(default_factory=list)
     points: int = 0
-
-    @property
-    def has_layers(self) -> bool:
-        """Whether its objects have layers instead of tags."""
-        return self.path.suffix.lower() == ".dxf"
 
     def add(self, feature: MapFeature) -> None:
         """Add an object.
@@ -135,23 +134,6 @@ class SiteMap:
                 f"{self.path}: {owner.place}: has the coordinate {coordinates[is_wrong][0]:g}, "
                 f"must be within {MOST_COORDINATE:g}"
             )
-
-
-def check_file(path: Path) -> None:
-    """Refuse a file that does not exist or is too large.
-
-    Raises:
-        BlastEnvError: If there is no such file, or it has more than `MOST_BYTES` bytes.
-    """
-    if not path.exists():
-        raise BlastEnvError(f"{path}: there is no such file")
-    if not path.is_file():
-        raise BlastEnvError(f"{path}: is not a file")
-    size = path.stat().st_size
-    if size > MOST_BYTES:
-        raise BlastEnvError(
-            f"{path}: has {size:,} bytes, must have at most {MOST_BYTES:,}: cut a smaller extract"
-        )
 
 
 def check_count(path: Path, count: int, most: int, what: str) -> None:

@@ -47,7 +47,7 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 
 def test_folder_and_unknown_suffix_are_named(tmp_path: Path) -> None:
     (tmp_path / "a.geojson").mkdir()
-    assert error_of(tmp_path / "a.geojson").endswith("is not a file")
+    assert error_of(tmp_path / "a.geojson").endswith("is a folder, must be a file")
     assert "suffix is '.shp', must be one of .geojson, .json, .dxf" in error_of(tmp_path / "a.shp")
 
 
@@ -57,7 +57,7 @@ def test_large_files_are_refused_before_they_are_read(
     path = tmp_path / "large.geojson"
     with path.open("wb") as file:
         file.truncate(site_map.MOST_BYTES + 1)  # takes no room on the disk
-    assert "has 50,000,001 bytes, must have at most 50,000,000" in error_of(path)
+    assert "has 50000001 bytes, must have at most 50000000" in error_of(path)
     monkeypatch.setattr(site_map, "MOST_FEATURES", 3)
     for suffix, options in ((".geojson", HALL), (".osm", HALL), (".dxf", replace(HALL, **LAYERS))):
         assert "outlines and lines, must have at most" in error_of(
