@@ -13,12 +13,8 @@ __all__ = ["FittedBuilding", "ImportOptions", "ImportedSite", "import_site"]
 
 def __getattr__(name: str) -> object:
     """Import the names that need the extra `maps` on first use; the options need no extra."""
-    if name in ("ImportedSite", "import_site"):
+    if name in __all__:
         from blast_env.io.importing import convert
 
         return getattr(convert, name)
-    if name == "FittedBuilding":
-        from blast_env.io.importing.fitting import FittedBuilding
-
-        return FittedBuilding
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

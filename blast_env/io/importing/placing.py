@@ -1,7 +1,4 @@
-"""Placing of the site on a map: its rectangle, its direction and its objects.
-
-The site has the direction of most walls; the grid is aligned with as many walls as possible.
-"""
+"""Placing of the site on a map: its rectangle, its direction and its objects."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,76 +21,12 @@ from blast_env.io.importing.options import (
     MOST_SITE_M,
     ImportOptions,
 )
-from blast_env.io.importing.outlines import edges_of
+from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
 from blast_env.io.importing.plane import Plane, plane_around, rotated
 from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
-
-_RIGHT_ANGLE_DEG: Final = 90.0
-_NEAR_DEG: Final = 4.0
-_NEAR_M: Final = 0.1
-_STRAIGHT_DEG: Final = 2.0
-_SHORTEST_M: Final = 1e-6
-
-
-def dominant_direction_deg(outlines: Sequence[BaseGeometry]) -> float:
-    """Return the direction of most walls, weighted by length, from the x axis: -45 to 45.
-
-    Walls at right angles count together. The result is the median over the walls near the most
-    frequent direction, so that a few houses in another direction have no influence.
-    """
-    starts, ends = _walls(outlines)
-    step = ends - starts
-    angles = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
-    angle = _densest(angles, np.hypot(*step.T), _RIGHT_ANGLE_DEG, _NEAR_DEG)
-    return angle - _RIGHT_ANGLE_DEG if angle > _RIGHT_ANGLE_DEG / 2.0 else angle
-
-
-def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
-    """Return the offset in x and y, 0 to a module's side, at which most walls lie on grid lines.
-
-    Walls along the grid count, by their length.
-    """
-    starts, ends = _walls(outlines)
-    step = ends - starts
-    slope = np.tan(np.radians(_STRAIGHT_DEG))
-    offsets = []
-    for across in (0, 1):
-        along = 1 - across
-        straight = np.abs(step[:, across]) <= slope * np.abs(step[:, along])
-        places = 0.5 * (starts + ends)[straight, across]
-        lengths = np.abs(step[straight, along])
-        offsets.append(_densest(places, lengths, MODULE_SIDE_M, _NEAR_M))
-    return offsets[0], offsets[1]
-
-
-def _walls(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
-    """Return both ends of every wall of every outline (n, 2)."""
-    starts, ends = edges_of(outlines)
-    long = np.hypot(*(ends - starts).T) > _SHORTEST_M
-    return starts[long], ends[long]
-
-
-def _densest(values: FloatArray, weights: FloatArray, period: float, near: float) -> float:
-    """Return the position of most weight on a circle, 0 to `period`; 0 without values."""
-    if len(values) == 0:
-        return 0.0
-    values = values % period
-    kinds, where = np.unique(np.round(values / (0.1 * near)), return_inverse=True)
-    heaps = np.bincount(where, weights)
-    centres = kinds * 0.1 * near
-    gaps = np.abs((centres[:, np.newaxis] - centres + period / 2.0) % period - period / 2.0)
-    closeness = np.maximum(0.0, 1.0 - gaps / near)
-    best = centres[int(np.argmax(closeness @ heaps))]
-    offset = (values - best + period / 2.0) % period - period / 2.0
-    nearby = np.abs(offset) <= near
-    order = np.argsort(offset[nearby])
-    heap = np.cumsum(weights[nearby][order])
-    median = offset[nearby][order][np.searchsorted(heap, 0.5 * heap[-1])]
-    return float((best + median) % period)
-
 
 OUTSIDE: Final = "outside the site"
 _EXCHANGED: Final = ": are longitude and latitude exchanged?"

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from blast_env.geometry import fewest_runs
 from blast_env.io.importing.fitting import Deviation
 from blast_env.io.importing.ground import cells_of, in_blocks
-from blast_env.io.importing.placing import dominant_direction_deg, grid_offset_m
+from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
 
 MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 
