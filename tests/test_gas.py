@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
-from blast_env.gas.engine import GasRun, scaled_distance
+from blast_env.gas.engine import GasRun
 from blast_env.particles.run import EndReason
 from blast_env.site.blast_site import Charge
 from tests.builders import block
@@ -245,5 +245,5 @@ def test_scaled_distance_is_that_of_the_nearest_point(
     site = unprotected.run.site
     hut = replace(site.structures[0], base_m=base_m, height_m=base_m + 2.0)
     raised = replace(site, charge=site.charge._replace(height_m=charge_m))
-    found = scaled_distance(raised, hut)
+    found = raised.scaled_distance(hut)
     assert found == pytest.approx(away_m / site.charge.tnt_kg ** (1.0 / 3.0))

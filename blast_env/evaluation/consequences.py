@@ -536,15 +536,13 @@ def _unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, s
 
     The loads are outside the validated range of the engine or the response, or not known.
     """
-    from blast_env.gas.engine import scaled_distance  # the run has imported it
-
     reasons: dict[str, dict[str, None]] = {}
     for outline in result.run.site.structures:
         if not outline.is_barrier:
             name = scenario.building_names.get(outline.name, outline.name)
             own = reasons.setdefault(name, {})
             own.update(dict.fromkeys(result.impulse(outline.name).notes))
-            if scaled_distance(result.run.site, outline) < CHECKED_SCALED_DISTANCE[0]:
+            if result.run.site.scaled_distance(outline) < CHECKED_SCALED_DISTANCE[0]:
                 own[_BREACH] = None
     yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
 

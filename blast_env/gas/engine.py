@@ -9,7 +9,7 @@ until the loads on the structures are known.
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from math import cbrt, ceil, hypot
+from math import cbrt, ceil
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -252,17 +252,6 @@ class GasRun:
                 "take smaller cells"
             )
         return tuple(notes)
-
-
-def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
-    """Return the scaled distance of a structure, m/kg^(1/3).
-
-    The distance is that of its nearest point: in plan, and below its base or above its top.
-    """
-    distance_m = min(box.distance_to(site.charge.position_m) for box in structure.boxes_m)
-    height_m, top_m = site.charge.height_m, structure.height_m or site.air_height_m
-    up_m = max(structure.base_m - height_m, height_m - top_m, 0.0)
-    return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
 
 
 def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:

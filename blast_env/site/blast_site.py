@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import cbrt, hypot
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from blast_env.geometry import Cell, Rectangle, WallLine
@@ -71,6 +72,16 @@ class BlastSite:
     gauges: tuple[Gauge, ...] = ()
     air_height_m: float = 12.0
     build_zone: "StructureOutline | None" = None
+
+    def scaled_distance(self, structure: "StructureOutline") -> float:
+        """Return the scaled distance of a structure from the charge, m/kg^(1/3).
+
+        The distance is that of its nearest point: in plan, and below its base or above its top.
+        """
+        distance_m = min(box.distance_to(self.charge.position_m) for box in structure.boxes_m)
+        height_m, top_m = self.charge.height_m, structure.height_m or self.air_height_m
+        up_m = max(structure.base_m - height_m, height_m - top_m, 0.0)
+        return hypot(distance_m, up_m) / cbrt(self.charge.tnt_kg)
 
 
 class Block(NamedTuple):

@@ -447,10 +447,8 @@ class GasResult:
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
         if run.solver.floored_cells:
             return Stood(LoadStanding.APPROXIMATE, _FLOORED.format(run.solver.floored_cells))
-        from blast_env.gas.engine import scaled_distance  # the run has imported it
-
         return standing_of(
-            scaled_distance(run.site, outline),
+            run.site.scaled_distance(outline),
             1.0 - float(seen.mean()) if len(own) else 0.0,
             cells_of(peak_factor(run.grid.cell_m, run.site.charge.tnt_kg)),
             run.is_known(index),
@@ -575,11 +573,9 @@ class GasResult:
         return write_tables(self.run_record, tables, path)
 
     def _notes(self, index: int) -> tuple[str, ...]:
-        from blast_env.gas.engine import scaled_distance  # the run has imported it
-
         notes = list(self.run.notes)
         low, high = CHECKED_SCALED_DISTANCE
-        scaled = scaled_distance(self.run.site, self.run.site.structures[index])
+        scaled = self.run.site.scaled_distance(self.run.site.structures[index])
         if not low <= scaled <= high:
             notes.append(
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
