@@ -20,12 +20,11 @@ from blast_env.plots.film_files import (
     plan_until,
     save_frames,
 )
-from blast_env.plots.frames import FramePainter
+from blast_env.plots.frames import ONE_SEED, FramePainter
 from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import PAGE
 from blast_env.plots.style import (
     barrier_text,
-    blast_title,
     charge_text,
     shown_until_s,
 )
@@ -145,20 +144,18 @@ def _paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) ->
 
 def _painters(results: Sequence[BlastResult], width_px: int) -> list[FramePainter]:
     """Return one painter per blast with a shared colour scale."""
-    full, unit = LoadScale.of(results)  # one scale, so that blasts are comparable
+    scale = LoadScale.of(results)  # one scale, so that blasts are comparable
     painters = []
     for result in results:
-        title, subtitle = blast_title(result.blast)
+        heading = None
         if len(results) > 1:  # short, because parts of a frame are narrow
-            title = barrier_text(result.blast.layout)
             subtitle = f"{charge_text(result.blast.scene.charge)}, seed {result.blast.seed}"
+            heading = barrier_text(result.blast.layout), subtitle, ONE_SEED
         painter = FramePainter(
             result.blast,
-            title=title,
-            subtitle=subtitle,
+            heading=heading,
             width_px=width_px - width_px % 2,
-            full_impulse=full / unit.factor,
-            unit=unit.with_loads_of(result.load_unit),
+            scale=scale._replace(unit=scale.unit.with_loads_of(result.load_unit)),
         )
         painters.append(painter)
     return painters

@@ -12,6 +12,7 @@ from blast_env.particles.run import BallStates
 from blast_env.particles.scene import Scene
 from blast_env.particles.structure import ModularObstacle
 from blast_env.plots.canvas import Frame, SiteSheet
+from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import (
     EXPLOSIVE,
     STANDING,
@@ -42,7 +43,6 @@ with render_extra():
     from matplotlib.artist import Artist
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.colors import Normalize
     from matplotlib.lines import Line2D
 
 _SMALLEST_RADIUS_PX: Final = 2.0
@@ -50,8 +50,8 @@ _SMALLEST_RIMMED_PX: Final = 3.5
 _RIM: Final = 0.72  # of the brightness of a ball
 _POINTS_PER_IN: Final = 72.0
 
-SIMULATION_UNITS: Final = LoadUnit()
-"""Loads without a calibration."""
+NO_LOADS: Final = LoadScale(0.0, LoadUnit())
+"""A scale in simulation units, without any load."""
 
 ONE_SEED: Final = "one draw of fan and air of many: judge by the mean over seeds"
 """Caveat in the film of one seed."""
@@ -62,19 +62,16 @@ class FramePainter:
 
     Args:
         blast: The blast; its site, structures and charge are drawn.
-        title: Heading of every frame; by default the scenario's name.
-        subtitle: Line under the heading; by default charge, layout and seed.
+        heading: Title of every frame, and two lines under it; by default the scenario's name, the
+            charge with layout and seed, and the caveat of one seed.
         width_px: Width of the frames, 320 to 4096; the height follows from the site and is even.
         height_px: Least height of the frames; even.
-        full_impulse: Impulse of a module, simulation units, at the end of the colour scale. By
-            default a bound from the scene alone, so that all layouts of one scenario and charge
-            have the same scale.
-        unit: Unit of the loads shown.
-        remark: A third line, in the style of the second.
+        scale: The colour scale. Without one, or one without any load, it ends at a bound from the
+            scene alone, so that all layouts of one scenario and charge have the same scale.
 
     Attributes:
         sheet: The page of the frames.
-        full_impulse: Impulse of a module at the end of the colour scale, simulation units.
+        scale: The colour scale.
 
     Raises:
         BlastEnvError: If the width is out of bounds.
@@ -84,35 +81,26 @@ class FramePainter:
         self,
         blast: Blast,
         *,
-        title: str | None = None,
-        subtitle: str | None = None,
+        heading: tuple[str, str, str] | None = None,
         width_px: int = 960,
         height_px: int = 0,
-        full_impulse: float | None = None,
-        unit: LoadUnit = SIMULATION_UNITS,
-        remark: str = ONE_SEED,
+        scale: LoadScale = NO_LOADS,
     ) -> None:
-        scene = blast.scene
-        if full_impulse is None or full_impulse <= 0.0:
-            full_impulse = nice_ceiling(free_flight_impulse(scene))
-        self.full_impulse = full_impulse
-        self._unit = unit
+        scene, unit = blast.scene, scale.unit
+        if scale.full == 0.0:
+            scale = LoadScale(unit.factor * nice_ceiling(free_flight_impulse(scene)), unit)
+        self.scale = scale
         features = blast_features(blast.scenario, blast.layout, scene.charge)
         on_ground = without(features, Kinds.SITE, *STANDING)
         destructible = any(each.capacity is not None for each in scene.structures)
         shown = without(features, Kinds.SITE)
         handles = [*_signs(scene), *legend_of_loads(shown, destructible=destructible)]
-        colours = ScalarMappable(Normalize(0.0, unit.factor * full_impulse), load_colours())
-        usual_title, usual_subtitle = blast_title(blast)
+        colours = ScalarMappable(scale.norm, load_colours())
         self.sheet = SiteSheet(
             scene.site_m,
             width_px,
             handles,
-            (
-                usual_title if title is None else title,
-                usual_subtitle if subtitle is None else subtitle,
-                remark,
-            ),
+            heading or (*blast_title(blast), ONE_SEED),
             (colours, f"{unit.label}; white: not hit"),
             height_px,
         )
@@ -154,16 +142,16 @@ class FramePainter:
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
         """Return the present loads on the protected structures, in words."""
         protected = [each for each in obstacles if each.protected]
-        loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
+        loads = [f"{each.name} {self.scale.unit.of_structure(each)}" for each in protected]
         return f"so far: {', '.join(loads)}" if loads else ""
 
     def _loads_on(self, obstacle: ModularObstacle) -> tuple[Artist, Artist]:
         """Return the modules coloured by load, and the crosses on destroyed ones."""
         known = self._loads.get(obstacle.name)
         if known is None:
-            scale = Normalize(0.0, self.full_impulse)
-            known = self._loads[obstacle.name] = draw_loads(self.sheet.axes, obstacle, scale, 0.3)
-        show_loads(known, obstacle)
+            known = draw_loads(self.sheet.axes, obstacle, self.scale.norm, 0.3)
+            self._loads[obstacle.name] = known
+        show_loads(known, obstacle, self.scale.unit.factor)
         return known
 
     def _flying(self, balls: BallStates) -> Iterator[Artist]:

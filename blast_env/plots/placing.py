@@ -1,7 +1,6 @@
 """Pictures of an episode of placing, and of the blast at its end."""
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
@@ -10,7 +9,8 @@ from blast_env.evaluation.engines import Blast
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import build_site
 from blast_env.plots.canvas import Frame, SiteSheet
-from blast_env.plots.frames import FramePainter
+from blast_env.plots.frames import ONE_SEED, FramePainter
+from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import (
     Feature,
     Kinds,
@@ -24,7 +24,7 @@ from blast_env.plots.plan import (
     without_counts,
 )
 from blast_env.plots.site_plan import draw_features, legend_of, write_names
-from blast_env.plots.style import charge_text, nice_ceiling, render_extra
+from blast_env.plots.style import charge_text, render_extra
 from blast_env.site import AnySource, PointSource, Scenario, VehicleSource
 from blast_env.site.blast_site import Charge
 
@@ -132,9 +132,6 @@ def _fullest_blast(scenario: Scenario) -> Blast:
     return Blast(scenario, [empty.catalogue.element(int(action)) for action in legal[:1]])
 
 
-_LEAST_FULL_IMPULSE: Final = 1e-9
-
-
 def last_frame(blast: Blast, outcome: str, remark: str, size_px: tuple[int, int]) -> Frame:
     """Run a blast and return its end, uint8 (height, width, 3).
 
@@ -145,14 +142,15 @@ def last_frame(blast: Blast, outcome: str, remark: str, size_px: tuple[int, int]
         size_px: Width and least height of the frame, as for `FramePainter`.
     """
     result = blast.run()
-    loads = [part.impulse for each in result.obstacles if each.protected for part in each.parts]
     painter = FramePainter(
         blast,
-        title=f"{blast.scenario.name}{remark}",
-        subtitle=f"charge {charge_text(blast.scene.charge)}",
+        heading=(
+            f"{blast.scenario.name}{remark}",
+            f"charge {charge_text(blast.scene.charge)}",
+            ONE_SEED,
+        ),
         width_px=size_px[0],
         height_px=size_px[1],
-        full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),
-        remark="",
+        scale=LoadScale.of([result]),
     )
     return painter.paint(result.final_balls, result.obstacles, result.time_s, outcome)

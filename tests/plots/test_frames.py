@@ -9,6 +9,7 @@ import numpy as np
 import pygame
 import pytest
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
@@ -17,6 +18,7 @@ from blast_env.particles.balls import CollisionType
 from blast_env.particles.structure import load_colour
 from blast_env.plots.canvas import Frame
 from blast_env.plots.frames import FramePainter
+from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.placing import PlacingPainter, sources_text
 from blast_env.plots.plan import BARRIER, EXPLOSIVE, FREE_CELL, PROTECTED
 from blast_env.plots.style import AIR
@@ -70,7 +72,7 @@ def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> N
 
 def test_the_size_of_frames_does_not_depend_on_the_loads(blast: Blast) -> None:
     loads = (1e-3, 0.0888, 7.0, 888.0, 8.88e4, 3e9)
-    painters = [FramePainter(blast, full_impulse=load) for load in loads]
+    painters = [FramePainter(blast, scale=LoadScale(load, LoadUnit())) for load in loads]
     assert len({painter.size_px for painter in painters}) == 1
 
 
@@ -98,7 +100,7 @@ def edge_of(painter: FramePainter, rectangle_m: Rectangle) -> list[tuple[int, in
 
 
 def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
-    painter = FramePainter(blast, full_impulse=100.0)
+    painter = FramePainter(blast, scale=LoadScale(100.0, LoadUnit()))
     obstacles = blast.scene.obstacles()
     part = obstacles[0].parts[0]
     seen = []
@@ -143,7 +145,7 @@ def test_a_destroyed_module_looks_different(blast: Blast) -> None:
 def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
     blast: Blast, barrier_blast: Blast
 ) -> None:
-    one, other = (FramePainter(each).full_impulse for each in (blast, barrier_blast))
+    one, other = (FramePainter(each).scale.full for each in (blast, barrier_blast))
     assert one == other > 0.0
 
 
