@@ -26,7 +26,6 @@ _RIGHT_ANGLE_DEG: Final = 90.0
 _NEAR_DEG: Final = 4.0
 _NEAR_M: Final = 0.1
 _STRAIGHT_DEG: Final = 2.0
-_SHORTEST_M: Final = 1e-6
 
 
 def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
@@ -39,7 +38,7 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
     Raises:
         BlastEnvError: If they are too long, or their bounding boxes have too many cells.
     """
-    starts, ends = edges_of(outlines)
+    starts, ends = _edges_of(outlines)
     crossed = float(np.abs(ends - starts).sum()) / MODULE_SIDE_M
     if crossed > MOST_CROSSED:
         raise BlastEnvError(
@@ -92,10 +91,10 @@ def _crosses_often(outline: BaseGeometry) -> bool:
 
 def walls_of(outline: BaseGeometry) -> NDArray[np.object_]:
     """Return the edges of an outline as lines."""
-    return np.asarray(shapely.linestrings(np.stack(edges_of([outline]), axis=1)))
+    return np.asarray(shapely.linestrings(np.stack(_edges_of([outline]), axis=1)))
 
 
-def edges_of(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
+def _edges_of(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
     """Return both ends of all edges of outlines (n, 2)."""
     rings = shapely.get_rings(shapely.get_parts(list(outlines)))
     places, ring = shapely.get_coordinates(rings, return_index=True)
@@ -116,7 +115,7 @@ def dominant_direction_deg(outlines: Sequence[BaseGeometry]) -> float:
     Walls at right angles count together. The result is the median over the walls near the most
     frequent direction, so that a few houses in another direction have no influence.
     """
-    starts, ends = _long_walls(outlines)
+    starts, ends = _edges_of(outlines)
     step = ends - starts
     angles = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
     angle = _densest(angles, np.hypot(*step.T), _RIGHT_ANGLE_DEG, _NEAR_DEG)
@@ -128,7 +127,7 @@ def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
 
     Walls along the grid count, by their length.
     """
-    starts, ends = _long_walls(outlines)
+    starts, ends = _edges_of(outlines)
     step = ends - starts
     slope = np.tan(np.radians(_STRAIGHT_DEG))
     offsets = []
@@ -139,13 +138,6 @@ def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
         lengths = np.abs(step[straight, along])
         offsets.append(_densest(places, lengths, MODULE_SIDE_M, _NEAR_M))
     return offsets[0], offsets[1]
-
-
-def _long_walls(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
-    """Return both ends of every wall of every outline (n, 2)."""
-    starts, ends = edges_of(outlines)
-    long = np.hypot(*(ends - starts).T) > _SHORTEST_M
-    return starts[long], ends[long]
 
 
 def _densest(values: FloatArray, weights: FloatArray, period: float, near: float) -> float:
