@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from math import isfinite
@@ -362,25 +362,25 @@ def _heights_m(feature: MapFeature, site_map: SiteMap) -> tuple[float | None, fl
     height does not hide a number of storeys. Of several numbers the largest counts.
     """
     own, level_m = site_map.options.height_from, site_map.options.level_height_m
-    ledger = site_map.ledger
+    tags = {str(name).lower(): value for name, value in feature.tags.items()}
+    lower, ledger = replace(feature, tags=tags), site_map.ledger
     if own is not None:
-        top_m = _first_m(feature, (own.lower(),), 1.0, ledger)
+        top_m = _first_m(lower, (own.lower(),), 1.0, ledger)
     else:
-        top_m = _first_m(feature, _HEIGHT_KEYS, 1.0, ledger)
-        top_m = top_m or _first_m(feature, _LEVEL_KEYS, level_m, ledger)
-    base_m = _first_m(feature, _BASE_KEYS, 1.0, ledger)
-    return top_m, base_m or _first_m(feature, _BASE_LEVEL_KEYS, level_m, ledger) or 0.0
+        top_m = _first_m(lower, _HEIGHT_KEYS, 1.0, ledger)
+        top_m = top_m or _first_m(lower, _LEVEL_KEYS, level_m, ledger)
+    base_m = _first_m(lower, _BASE_KEYS, 1.0, ledger)
+    return top_m, base_m or _first_m(lower, _BASE_LEVEL_KEYS, level_m, ledger) or 0.0
 
 
 def _first_m(
     feature: MapFeature, keys: Sequence[str], unit_m: float, ledger: Ledger
 ) -> float | None:
-    """Return the first readable height of some tags, m."""
-    tags = {str(name).lower(): value for name, value in feature.tags.items()}
+    """Return the first readable height of some tags, which are in lower case, m."""
     for key in keys:
-        if key not in tags:
+        if key not in feature.tags:
             continue
-        value = tags[key]
+        value = feature.tags[key]
         number = length_m(value)
         if number is None and isinstance(value, str) and _SEVERAL.fullmatch(value.strip()):
             numbers = [length_m(each) for each in re.split(r"[;/-]", value[:MAX_TEXT])]
