@@ -35,7 +35,7 @@ def closed(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     found: list[Thing] = []
     loose: dict[Role, list[Thing]] = {}
     for thing in things:
-        if not thing.is_line or thing.fault or thing.role in (Role.CHARGE, Role.NAME):
+        if not thing.is_line or thing.role in (Role.CHARGE, Role.NAME):
             found.append(thing)
             continue
         outline = _ring(thing, ledger)
