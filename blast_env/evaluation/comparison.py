@@ -232,8 +232,8 @@ class Evaluation:
         check_something_arrives(self.cases, self.unprotected)
 
     @property
-    def has_one_case(self) -> bool:
-        """Whether there is a single case, so that intervals and the worst are over its threats."""
+    def _has_one_case(self) -> bool:
+        """Whether there is a single case, so that intervals are over its threats."""
         return len(self.cases) == 1
 
     @cached_property
@@ -265,9 +265,9 @@ class Evaluation:
     @cached_property
     def reduction(self) -> Estimate:
         """The mean reduction with its 95 % interval."""
-        if self.has_one_case and self._is_mean:
+        if self._has_one_case and self._is_mean:
             return reduction_estimate(self.loads[0], self.unprotected[0])
-        if self.has_one_case:
+        if self._has_one_case:
             return Estimate(float(self.case_reductions[0]), np.nan, np.nan)
         value, low, high = mean_estimate(self.case_reductions)
         return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
@@ -277,7 +277,7 @@ class Evaluation:
 
         The other one has other layouts on the same cases.
         """
-        if self.has_one_case and self._is_mean:
+        if self._has_one_case and self._is_mean:
             # The reduction of the load without a barrier if it fell by the difference of loads.
             unprotected = self.unprotected[0]
             left = unprotected + self.loads[0] - other.loads[0]

@@ -115,7 +115,7 @@ def compare(
     pairs = zip(cases, layouts, strict=True)
     cells = [tuple(check_layout(case.scenario, layout)) for case, layout in pairs]
     blasts, unprotected = zip(
-        *loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
+        *_loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
     )
     found = Evaluation(
         tuple(cases), tuple(cells), blasts, unprotected, evaluators.engine, cvar_level
@@ -132,7 +132,7 @@ def compare(
     return replace(found, grid_error=error)
 
 
-def loads_of_both(
+def _loads_of_both(
     evaluator_of: Callable[[Scenario], BlastEvaluator],
     cases: Sequence[LoadCaseSet],
     layouts: Sequence[Layout],
