@@ -113,11 +113,13 @@ class Rectangle(NamedTuple):
             and other.bottom < self.top - tolerance
         )
 
-    def meets_segment(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+    def intersects_segment(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Whether the segment from `start` to `end` has a point in the open rectangle."""
-        return bool(self.meets_segments(start, np.array(end[0]), np.array(end[1])))
+        return bool(self.intersects_segments(start, np.array(end[0]), np.array(end[1])))
 
-    def meets_segments(self, start: tuple[float, float], x: FloatArray, y: FloatArray) -> BoolArray:
+    def intersects_segments(
+        self, start: tuple[float, float], x: FloatArray, y: FloatArray
+    ) -> BoolArray:
         """Return a mask of the segments that have a point in the open rectangle.
 
         Args:

@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-Tell = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 """A callback for the finished share of some work, 0 to 1."""
 
 
@@ -20,7 +20,7 @@ def run_all(
     function: Callable[[Item], Result],
     items: Sequence[Item],
     workers: int = 1,
-    progress: Tell | None = None,
+    progress: ProgressCallback | None = None,
 ) -> list[Result]:
     """Return the results of all items in their order, computed in parallel processes.
 
@@ -68,16 +68,22 @@ def as_completed(
     return _parallel(numbered, list(enumerate(items)), count, "generator_unordered")
 
 
-def workers_told() -> int:
+def configured_workers() -> int:
     """Return the number of workers set for joblib (`on_cluster`), by default 1."""
     return int(joblib.effective_n_jobs(None))
 
 
 @overload
-def share_of(progress: Tell, done: int, whole: int, part: int = 1) -> Tell: ...
+def share_of(
+    progress: ProgressCallback, done: int, whole: int, part: int = 1
+) -> ProgressCallback: ...
 @overload
-def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None: ...
-def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None:
+def share_of(
+    progress: ProgressCallback | None, done: int, whole: int, part: int = 1
+) -> ProgressCallback | None: ...
+def share_of(
+    progress: ProgressCallback | None, done: int, whole: int, part: int = 1
+) -> ProgressCallback | None:
     """Return a callback that converts the share of a part to a share of the whole.
 
     Args:
@@ -104,7 +110,7 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
 
 def _processes(workers: int, items: int) -> int:
     """Return the number of processes for the work; 1 for this process alone."""
-    return max(min(max(workers, workers_told()), items), 1)
+    return max(min(max(workers, configured_workers()), items), 1)
 
 
 def _parallel(

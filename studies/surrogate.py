@@ -22,7 +22,7 @@ from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.moves import Moves, random_walls
 from blast_env.design.surrogate.fitting import (
     Errors,
-    ErrorsOfBoth,
+    LoadErrors,
     Loads,
     Predictions,
     Samples,
@@ -235,7 +235,7 @@ def calibrate(
             for index, loads in enumerate((samples.impulse, samples.peak))
         )
         sites = f"{len(np.unique(samples.site))} held-out sites"
-        print_line(_errors_table({sites: ErrorsOfBoth(impulse.errors, peak.errors)}))
+        print_line(_errors_table({sites: LoadErrors(impulse.errors, peak.errors)}))
         print_line("\n" + _coverage_table(samples, impulse.inside, peak.inside, _kind))
         about = loaded.fit.model_copy(
             update={
@@ -345,7 +345,7 @@ def _inside(found: Predictions, loads: Loads, record: Check) -> BoolArray:
     return inside
 
 
-def _errors_table(found: Mapping[str, ErrorsOfBoth]) -> str:
+def _errors_table(found: Mapping[str, LoadErrors]) -> str:
     rows = [
         (
             f"{load} on {sites}",

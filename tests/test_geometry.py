@@ -20,8 +20,8 @@ def test_a_segment_meets_a_rectangle_if_a_point_of_it_is_inside() -> None:
         )
         inside = (points_x > ROOM.left + LEAST) & (points_x < ROOM.right - LEAST)
         inside &= (points_y > ROOM.bottom + LEAST) & (points_y < ROOM.top - LEAST)
-        met = ROOM.meets_segments(start, x, y)
+        met = ROOM.intersects_segments(start, x, y)
         assert (met == inside.any(axis=0)).all()
-        assert [ROOM.meets_segment(start, end) for end in starts] == met.tolist()
+        assert [ROOM.intersects_segment(start, end) for end in starts] == met.tolist()
         seen |= set(met.tolist())
     assert seen == {True, False}

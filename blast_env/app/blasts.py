@@ -18,8 +18,8 @@ from blast_env.app.records import (
     RECORD,
     BlastRecord,
     CoarseLoads,
-    Kept,
     Picture,
+    StoredRecord,
     blast_key,
     read_kept,
     read_record,
@@ -27,7 +27,7 @@ from blast_env.app.records import (
     write_kept,
 )
 from blast_env.app.verdicts import keep_facades
-from blast_env.app.work import Teller
+from blast_env.app.work import StatusWriter
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
@@ -43,7 +43,7 @@ from blast_env.plots.pressure_film import record_planes, scale_end_kpa
 from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.style import render_extra
 from blast_env.provenance import versions
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 from blast_env.site import Scenario, load_scenario
 from blast_env.units import PA_PER_KPA
 
@@ -58,7 +58,7 @@ _LEAST_SHOWN: Final = 0.05  # of the end of a film's scale
 _QUALITY: Final = 82
 
 
-class Scale(Kept):
+class Scale(StoredRecord):
     """The colour scales of all blasts of one threat.
 
     Attributes:
@@ -106,7 +106,7 @@ class BlastTask:
     layout: Layout
     blasts: Path
 
-    def __call__(self, teller: Teller) -> None:
+    def __call__(self, writer: StatusWriter) -> None:
         """Run one blast per threat with the layout, and one without a barrier for comparison.
 
         Blasts with a complete record are not run again. The worst threat of the layout runs on
@@ -120,15 +120,15 @@ class BlastTask:
         pairs = ((threat, each) for threat in self.threats for each in ((), layout))
         work = list(dict.fromkeys(pairs))
         for number, (threat, cells) in enumerate(work):
-            self._run(threat, cells, share_of(teller.share, number, len(work)))
+            self._run(threat, cells, share_of(writer.share, number, len(work)))
         self._run_coarse(layout)
-        teller.tell(state="done", share=1.0, text="done")
+        writer.write(state="done", share=1.0, text="done")
 
     def _folder_of(self, layout: Layout, threat: LoadCase) -> Path:
         charge = charge_against(self.site, layout, threat.charge)
         return self.blasts / blast_key(self.site, layout, charge, self.cells)
 
-    def _run(self, threat: LoadCase, layout: Layout, tell: Tell) -> None:
+    def _run(self, threat: LoadCase, layout: Layout, tell: ProgressCallback) -> None:
         site, folder = self.site, self._folder_of(layout, threat)
         if read_record(folder) is not None:
             return
@@ -240,7 +240,7 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
         yield Picture(file=name, label=f"gauge {gauge}")
 
 
-def _film(shot: PressureShot, scale: Scale, folder: Path, tell: Tell) -> Picture:
+def _film(shot: PressureShot, scale: Scale, folder: Path, tell: ProgressCallback) -> Picture:
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
     frames = []
     for number, time_s in enumerate(np.linspace(0.0, scale.until_s, FRAMES).tolist(), start=1):

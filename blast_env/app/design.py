@@ -65,7 +65,7 @@ class Design:
         """Return the design on a changed site, and notes on the elements removed from layouts."""
         layouts, notes = [], []
         for name, layout in zip(SLOTS, self.layouts, strict=True):
-            kept, reasons = placing.what_still_stands(scenario, layout)
+            kept, reasons = placing.legal_elements(scenario, layout)
             layouts.append(kept)
             if reasons:
                 notes.append(f"layout {name}: {len(reasons)} removed: {reasons[0]}")

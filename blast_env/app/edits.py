@@ -394,7 +394,9 @@ def has_road_in_zone(scenario: Scenario) -> bool:
     """Return whether a line on which a charge may be crosses the build zone."""
     zone = scenario.build_zone
     roads = (each for each in scenario.charge if isinstance(each, SegmentSource))
-    return zone is not None and any(zone.rectangle_m.meets_segment(*x.segment_m) for x in roads)
+    return zone is not None and any(
+        zone.rectangle_m.intersects_segment(*x.segment_m) for x in roads
+    )
 
 
 def _fit_catalogue(document: Document, whole: int | None) -> None:

@@ -22,7 +22,7 @@ from threading import Thread
 from time import monotonic
 from typing import Final
 
-from blast_env.app.work import Status, Task, Teller, end, read_status, write_status
+from blast_env.app.work import Status, StatusWriter, Task, end, read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
 
@@ -41,7 +41,7 @@ _CONTEXT: Final = (
 def do(folder: Path, task: Task) -> None:
     """Do the task of a folder and write the outcome into its status; raise no error."""
     try:
-        task(Teller(folder))
+        task(StatusWriter(folder))
     except KeyboardInterrupt:
         end(folder, "stopped", "stopped")
     except BlastEnvError as error:

@@ -168,7 +168,7 @@ def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | No
     return LayoutState.of(scenario.without_budget, layout).explain(new)
 
 
-def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[str, ...]]:
+def legal_elements(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[str, ...]]:
     """Return the part of a layout that is legal on a changed site.
 
     Returns:

@@ -45,16 +45,16 @@ MOST_BYTES: Final = 50_000_000
 """Largest size of a file of the work folder."""
 
 
-class Kept(BaseModel):
+class StoredRecord(BaseModel):
     """Base of the records in files: frozen; missing numbers are NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
 
-AnyKept = TypeVar("AnyKept", bound=Kept)
+AnyKept = TypeVar("AnyKept", bound=StoredRecord)
 
 
-class DesignSettings(Kept):
+class DesignSettings(StoredRecord):
     """The settings of a design's page, which its history does not have.
 
     Attributes:
@@ -68,14 +68,14 @@ class DesignSettings(Kept):
     view: str = "Plan"
 
 
-class Picture(Kept):
+class Picture(StoredRecord):
     """A picture of a blast: its file and its label."""
 
     file: str
     label: str
 
 
-class BlastRecord(Kept):
+class BlastRecord(StoredRecord):
     """The record of a blast.
 
     Attributes:
@@ -104,7 +104,7 @@ class BlastRecord(Kept):
     repeat: dict[str, Any]
 
 
-class CoarseLoads(Kept):
+class CoarseLoads(StoredRecord):
     """The loads of a blast with cells twice as large, for the error of the cells.
 
     Attributes:
@@ -133,7 +133,7 @@ def only(loads: BlastLoads, names: Collection[str]) -> BlastLoads:
     return replace(loads, structures=tuple(replace(each, protected=True) for each in parts))
 
 
-def write_kept(record: Kept, path: Path) -> None:
+def write_kept(record: StoredRecord, path: Path) -> None:
     """Write a record, the whole file or none.
 
     Raises:
@@ -177,7 +177,7 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, cells: Cells) 
 
 
 @dataclass(frozen=True)
-class Blasted:
+class BlastedLayout:
     """A layout with its blasts.
 
     Attributes:
@@ -192,7 +192,7 @@ class Blasted:
     records: Mapping[str, BlastRecord]
     coarse: Mapping[str, CoarseLoads] = field(default_factory=dict)
 
-    def errors(self, bare: "Blasted", objective: ObjectiveSection) -> CellErrors | None:
+    def errors(self, bare: "BlastedLayout", objective: ObjectiveSection) -> CellErrors | None:
         """Return the error of the cells, from the largest load that has both sizes."""
         worst = sorted(self.records.values(), key=lambda each: -worst_first(objective, each))
         for record in worst:
@@ -209,7 +209,7 @@ class Blasted:
 
 
 def comparison(
-    layouts: Sequence[Blasted], threats: Sequence[str], scenario: Scenario
+    layouts: Sequence[BlastedLayout], threats: Sequence[str], scenario: Scenario
 ) -> AnswerTable:
     """Return the comparison of layouts, one row per layout, threat and building.
 
@@ -247,8 +247,8 @@ def comparison(
 
 
 def _row(
-    layout: Blasted,
-    bare: Blasted,
+    layout: BlastedLayout,
+    bare: BlastedLayout,
     threats: Sequence[str],
     words: tuple[str, str],
     names: tuple[str, ...],
@@ -265,7 +265,7 @@ def _row(
             return found.protected_impulse_pa_s
         return on_buildings(found.structures)[0].impulse_pa_s
 
-    def over_all(side: Blasted, number_of: LoadOf) -> float:
+    def over_all(side: BlastedLayout, number_of: LoadOf) -> float:
         found = [number_of(blast_loads(side.records[each])) for each in threats]
         return float(objective.risk(np.array(found)))
 

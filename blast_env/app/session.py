@@ -17,7 +17,7 @@ from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
 from blast_env.app.offers import runs_blasts
 from blast_env.app.records import (
-    Blasted,
+    BlastedLayout,
     DesignSettings,
     blast_key,
     comparison,
@@ -62,7 +62,7 @@ BARE = "no barrier"
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownLayout:
     """A layout with a blast to show beside others.
 
     Attributes:
@@ -447,7 +447,7 @@ class Session:
 
     # Results.
 
-    def shown(self, threat: LoadCase) -> tuple[Shown, ...]:
+    def shown(self, threat: LoadCase) -> tuple[ShownLayout, ...]:
         """Return the layouts with the keys of their blasts under a threat, no barrier first.
 
         Empty layouts are left out: they equal no barrier.
@@ -458,7 +458,9 @@ class Session:
             for name, layout in zip(SLOTS, self.design.layouts, strict=True)
             if layout
         ]
-        return tuple(Shown(name, layout, self.key(layout, threat)) for name, layout in layouts)
+        return tuple(
+            ShownLayout(name, layout, self.key(layout, threat)) for name, layout in layouts
+        )
 
     def key(self, layout: Layout, threat: LoadCase) -> str:
         """Return the key of a blast."""
@@ -476,7 +478,7 @@ class Session:
             coarse = {own.key: folder.coarse_of(own.key) for own in records.values()}
             known = {key: loads for key, loads in coarse.items() if loads is not None}
             cost = placing.cost_of(self.scenario, each.layout)
-            layouts.append(Blasted(each.name, cost, records, known))
+            layouts.append(BlastedLayout(each.name, cost, records, known))
         return comparison(layouts, [each.name for each in threats], self.scenario)
 
     def verdicts(self) -> AnswerTable:
@@ -489,7 +491,7 @@ class Session:
         ]
         return verdict_table(self.scenario, found)
 
-    def judged(self, shown: Shown, threat: LoadCase) -> tuple[Judged, ...]:
+    def judged(self, shown: ShownLayout, threat: LoadCase) -> tuple[Judged, ...]:
         """Return the response of the buildings with their current facades to a blast."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
@@ -501,13 +503,13 @@ class Session:
             self._judged[known] = tuple(map(Judged.of, read.responses))
         return self._judged[known]
 
-    def damage_png(self, shown: Shown, threat: LoadCase, building: str) -> bytes | None:
+    def damage_png(self, shown: ShownLayout, threat: LoadCase, building: str) -> bytes | None:
         """Return the picture of a building's damage; `None` without the histories on its bays."""
         read = self._facades(shown, threat)
         own = () if read is None else (x for x in read.responses if x.building == building)
         return next(map(damage_png, own), None)
 
-    def _facades(self, shown: Shown, threat: LoadCase) -> Consequences | None:
+    def _facades(self, shown: ShownLayout, threat: LoadCase) -> Consequences | None:
         folder = self.folder.blast_of(shown.key)
         return stored_consequences(self.scenario, shown.layout, threat.charge, folder)
 

@@ -1,6 +1,6 @@
 """The tasks of the page: searches, answers, reports; blasts are in `blasts`.
 
-Each is called in a process, see `jobs`, and reports its progress through a `Teller`.
+Each is called in a process, see `jobs`, and reports its progress through a `StatusWriter`.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from blast_env.app import placing
 from blast_env.app.records import write_kept
-from blast_env.app.work import ANSWER, Answer, Question, Teller
+from blast_env.app.work import ANSWER, Answer, Question, StatusWriter
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
 from blast_env.design.search.registry import proposer_row
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
@@ -60,7 +60,7 @@ class SearchTask:
         evaluator = BlastEvaluator(site, engine.coarser or engine, cache=self.cache)
         return DesignProblem(evaluator, LoadCaseSet(site, self.threats))
 
-    def __call__(self, teller: Teller) -> None:
+    def __call__(self, writer: StatusWriter) -> None:
         """Search; an interrupted search ends with its best layout so far.
 
         Raises:
@@ -69,20 +69,20 @@ class SearchTask:
         """
         problem = self.problem
         if self.budget:
-            teller.tell(text="blasts without a barrier")
+            writer.write(text="blasts without a barrier")
             problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
 
         def report(progress: Progress) -> None:
             if progress.best is None:
-                teller.share(progress.share)
+                writer.share(progress.share)
                 return
             best = placing.plain(progress.best.layout)
             gone = 100.0 * progress.best.reduction(problem)
             text = f"{progress.blasts} of {progress.budget} blasts, best reduction {gone:.1f} %"
-            if best != teller.status.layout:
-                teller.tell(share=progress.share, text=text, layout=best)
-            elif teller.is_due:
-                teller.tell(share=progress.share, text=text)
+            if best != writer.status.layout:
+                writer.write(share=progress.share, text=text, layout=best)
+            elif writer.is_due:
+                writer.write(share=progress.share, text=text)
 
         result = find_proposer(self.method).propose(problem, self.budget, 0, report)
         if result.load is None and result.interrupted:
@@ -98,7 +98,7 @@ class SearchTask:
                 f" ({problem.evaluator.engine.words}); blast the layout to confirm it"
             )
         state = "stopped" if result.interrupted else "done"
-        teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
+        writer.write(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +131,7 @@ class AnswerTask:
     mass_error: float
     budget: int
 
-    def __call__(self, teller: Teller) -> None:
+    def __call__(self, writer: StatusWriter) -> None:
         """Answer the question, and keep the answer in a file.
 
         Raises:
@@ -139,16 +139,16 @@ class AnswerTask:
         """
         changes: dict[str, object] = {}
         if self.question is Question.ADVISE:
-            layout, parts = self._advice(teller)
+            layout, parts = self._advice(writer)
             changes["layout"] = placing.plain(layout) or None
         else:
-            parts = [*self._judgement(teller)]
+            parts = [*self._judgement(writer)]
         answer = Answer(question=self.question, subject=self.subject, parts=tuple(parts))
-        write_kept(answer, teller.folder / ANSWER)
+        write_kept(answer, writer.folder / ANSWER)
         first = next(each for each in answer.parts if isinstance(each, str))
-        teller.tell(state="done", share=1.0, text=first, **changes)
+        writer.write(state="done", share=1.0, text=first, **changes)
 
-    def _judgement(self, teller: Teller) -> Iterator[AnswerPart]:
+    def _judgement(self, writer: StatusWriter) -> Iterator[AnswerPart]:
         # Here, as below, because they take long to import, and a blast needs none of them.
         from blast_env.evaluation.assessment import assess
         from blast_env.evaluation.capacity import capacity
@@ -158,22 +158,22 @@ class AnswerTask:
         if self.layout:
             layouts[f"layout {self.name}"] = self.layout
         if self.question is Question.ASSESS:
-            found = assess(self.site, layouts, charges, engine, teller.share, cache=self.cache)
+            found = assess(self.site, layouts, charges, engine, writer.share, cache=self.cache)
             return found.answer(self.target, self.mass_error)
         evaluator = BlastEvaluator(self.site, engine, cache=self.cache)
-        return iter(capacity(evaluator, layouts, charges, teller.share))
+        return iter(capacity(evaluator, layouts, charges, writer.share))
 
-    def _advice(self, teller: Teller) -> tuple[Layout, list[AnswerPart]]:
-        from blast_env.design.search.advised import AdviceJudge, advised, asked_site
+    def _advice(self, writer: StatusWriter) -> tuple[Layout, list[AnswerPart]]:
+        from blast_env.design.search.advised import AdviceJudge, advised, site_with_target
 
-        engine, site = GasEngine.with_cells(self.cells), asked_site(self.site, self.target)
+        engine, site = GasEngine.with_cells(self.cells), site_with_target(self.site, self.target)
         coarse = BlastEvaluator(site, engine.coarser or engine, cache=self.cache)
         judge = AdviceJudge(
             DesignProblem(coarse, LoadCaseSet(site, self.threats)),
             BlastEvaluator(site, engine, cache=self.cache),
             self.mass_error,
         )
-        advice = advised(judge, self.budget, progress=teller.share)
+        advice = advised(judge, self.budget, progress=writer.share)
         return advice.best.layout, [*advice.answer()]
 
 
@@ -195,7 +195,7 @@ class ReportTask:
     page: Path
     pdf: Path | None = None
 
-    def __call__(self, teller: Teller) -> None:
+    def __call__(self, writer: StatusWriter) -> None:
         """Write the report; a stopped one has the finished parts.
 
         Raises:
@@ -207,12 +207,12 @@ class ReportTask:
         from blast_env.report.cost import ReportCost
 
         cost = ReportCost.of(self.site, self.layout, self.options)
-        teller.tell(grace_s=_WRITING_S)
+        writer.write(grace_s=_WRITING_S)
 
         def tell(what: str, part: float) -> None:
             share = cost.share(what, part)
-            if teller.is_due or share is None:
-                teller.tell(text=what, share=teller.status.share if share is None else share)
+            if writer.is_due or share is None:
+                writer.write(text=what, share=writer.status.share if share is None else share)
 
         study = run_study(self.site, self.layout, self.options, tell)
         written = write_report(study, self.page, self.pdf)
@@ -220,4 +220,4 @@ class ReportTask:
         if study.stopped:
             words = f"stopped before: {study.stopped}; {words} with the finished parts"
         state = "stopped" if study.stopped else "done"
-        teller.tell(state=state, share=1.0, text=words, file=str(written[-1]))
+        writer.write(state=state, share=1.0, text=words, file=str(written[-1]))

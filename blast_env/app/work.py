@@ -6,7 +6,7 @@ from pathlib import Path
 from time import monotonic, time
 from typing import Any, Final, Literal, TypeAlias
 
-from blast_env.app.records import MOST_BYTES, Kept, write_kept
+from blast_env.app.records import MOST_BYTES, StoredRecord, write_kept
 from blast_env.documents import check_values, read_text
 from blast_env.evaluation.answers import AnswerTable
 
@@ -19,7 +19,7 @@ _LEAST_PAUSE_S: Final = 0.1
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
-class Status(Kept):
+class Status(StoredRecord):
     """The progress of work.
 
     Attributes:
@@ -74,7 +74,7 @@ def end(folder: Path, state: State, text: str) -> None:
         write_status(status.model_copy(update={"state": state, "text": text}), folder)
 
 
-class Teller:
+class StatusWriter:
     """Writes the progress of work into its status, at most every 0.1 s.
 
     Args:
@@ -85,24 +85,24 @@ class Teller:
         self.folder = folder
         changes = {"state": "running", "began_s": time()}
         self._status = read_status(folder).model_copy(update=changes)
-        self._told_s = 0.0
-        self.tell()
+        self._written_s = 0.0
+        self.write()
 
-    def tell(self, **changes: object) -> None:
+    def write(self, **changes: object) -> None:
         """Write changes of the status at once; the keys are the fields of `Status`."""
         self._status = self._status.model_copy(update=changes)
-        self._told_s = monotonic()
+        self._written_s = monotonic()
         write_status(self._status, self.folder)
 
     def share(self, share: float) -> None:
         """Write the completed share, 0 to 1, if an update is due."""
         if self.is_due:
-            self.tell(share=min(max(share, 0.0), 1.0))
+            self.write(share=min(max(share, 0.0), 1.0))
 
     @property
     def is_due(self) -> bool:
         """Whether the last update is long enough ago."""
-        return monotonic() - self._told_s >= _LEAST_PAUSE_S
+        return monotonic() - self._written_s >= _LEAST_PAUSE_S
 
     @property
     def status(self) -> Status:
@@ -110,7 +110,7 @@ class Teller:
         return self._status
 
 
-Task: TypeAlias = Callable[[Teller], None]
+Task: TypeAlias = Callable[[StatusWriter], None]
 """Work for a process: it pickles, and may be interrupted anywhere by `KeyboardInterrupt`."""
 
 
@@ -128,7 +128,7 @@ class Question(StrEnum):
     ADVISE = "advise"
 
 
-class Answer(Kept):
+class Answer(StoredRecord):
     """The answer to a question.
 
     Attributes:

@@ -15,27 +15,27 @@ from blast_env.benchmark.judging import (
     judge,
     shipped_standings,
 )
-from blast_env.benchmark.problem import BenchmarkProblem, Evaluated, make
+from blast_env.benchmark.problem import BenchmarkProblem, EvaluatedLayout, make
 from blast_env.benchmark.references import KnownLayout, ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
 from blast_env.benchmark.standings import standings_page, standings_tables
-from blast_env.benchmark.submissions import Asked, Method, Run, Submission, play
+from blast_env.benchmark.submissions import Method, Run, RunGrid, Submission, play
 
 __all__ = [
     "BUDGETS",
     "DEFINITIONS",
     "JUDGE_CELL_M",
     "SEEDS",
-    "Asked",
     "BenchmarkProblem",
     "Definition",
-    "Evaluated",
+    "EvaluatedLayout",
     "JudgedRun",
     "JudgedSubmission",
     "KnownLayout",
     "LayoutSpace",
     "Method",
     "Run",
+    "RunGrid",
     "ScoreReference",
     "Submission",
     "judge",

@@ -30,7 +30,7 @@ _MOST_REPEATS: Final = 200
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class EvaluatedLayout:
     """An evaluated layout.
 
     Attributes:
@@ -59,7 +59,7 @@ class BenchmarkProblem(DesignProblem):
     """
 
     definition: Definition
-    history: list[Evaluated] = field(default_factory=list, init=False)
+    history: list[EvaluatedLayout] = field(default_factory=list, init=False)
     _repeats: int = field(default=0, init=False, repr=False)
 
     @property
@@ -103,7 +103,7 @@ class BenchmarkProblem(DesignProblem):
         return self.most_blasts - self.blasts
 
     @property
-    def best(self) -> Evaluated | None:
+    def best(self) -> EvaluatedLayout | None:
         """The best of the layouts evaluated with most threats; `None` before the first."""
         return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
 
@@ -124,7 +124,7 @@ class BenchmarkProblem(DesignProblem):
         met = replace(self.case, threats=self.case.threats[: found.threats])
         unprotected = met.objective_value(self.unprotected[: found.threats], ())
         share = found.load / unprotected
-        self.history.append(Evaluated(found.layout, share, found.threats, found.blasts))
+        self.history.append(EvaluatedLayout(found.layout, share, found.threats, found.blasts))
 
     def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
         """Return the reasons why a layout is illegal, one sentence each; none if it is legal.
@@ -176,7 +176,7 @@ class BenchmarkProblem(DesignProblem):
             raise BudgetError(f"{self.name}: {_MOST_REPEATS} evaluations without a new blast")
         met = replace(self.case, threats=self.case.threats[:count])
         (share,) = shares_of(met, [checked], self.evaluator)
-        self.history.append(Evaluated(checked, share, count, self.blasts))
+        self.history.append(EvaluatedLayout(checked, share, count, self.blasts))
         return share
 
     def judged(self, layout: Sequence[Element], processes: int = 1) -> float:

@@ -197,7 +197,7 @@ def write_runs(path: str | Path, record: Any) -> Path:
 
 
 @dataclass(frozen=True)
-class Asked:
+class RunGrid:
     """The runs of a method: every problem, budget and seed.
 
     Attributes:
@@ -230,7 +230,7 @@ def play(
 
     Args:
         method: The method.
-        asked: Triples (function that makes the problem, budget, seed); see `Asked`.
+        asked: Triples (function that makes the problem, budget, seed); see `RunGrid`.
         store: File in which each run is kept, a `Store`; runs that it has are not repeated.
         progress: Called with each run.
 

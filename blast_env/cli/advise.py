@@ -35,7 +35,13 @@ from blast_env.cli.output import (
 )
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for
-from blast_env.design.search.advised import ROUNDS, AdviceJudge, Advised, advised, asked_site
+from blast_env.design.search.advised import (
+    ROUNDS,
+    AdviceJudge,
+    AdviceResult,
+    advised,
+    site_with_target,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
@@ -89,7 +95,7 @@ def advise(
     target. Hardening needs no further blasts.
     """
     level = wanted_level(target, load_scenario(scenario), LevelOfProtection.MEDIUM)
-    site = asked_site(load_scenario(scenario), level, target_probability, budget_cost)
+    site = site_with_target(load_scenario(scenario), level, target_probability, budget_cost)
     threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
     if budget < len(threats):
         raise BlastEnvError(
@@ -117,7 +123,7 @@ def advise(
     print_written(save_figures((picture, partial(_draw, found))))
 
 
-def _draw(advice: Advised) -> "Figure":
+def _draw(advice: AdviceResult) -> "Figure":
     # Here, because pictures need the extra `render`.
     from blast_env.plots.cost_level import PricedDamage, cost_level_figure
 

@@ -193,8 +193,8 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
         f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
         f"{imported.scenario.simulation.preset}"
     )
-    sums = Counter(each.deed for each in imported.ledger.entries)
-    print_line(f"ledger: {', '.join(f'{deed} {count}' for deed, count in sums.items())}")
+    sums = Counter(each.fate for each in imported.ledger.entries)
+    print_line(f"ledger: {', '.join(f'{fate} {count}' for fate, count in sums.items())}")
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)

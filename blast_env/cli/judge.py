@@ -14,11 +14,11 @@ from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
     JUDGE_CELL_M,
-    Asked,
     BenchmarkProblem,
     Definition,
     JudgedSubmission,
     Method,
+    RunGrid,
     ScoreReference,
     Submission,
     make,
@@ -195,7 +195,7 @@ class _Judging:
     ) -> Submission:
         """Run a method; its submission is written before it is judged."""
         made = [partial(self.made, each) for each in definitions.values()]
-        asked = tuple(Asked(made, budgets, self.seeds))
+        asked = tuple(RunGrid(made, budgets, self.seeds))
         store = None
         if self.out is not None:  # the runs that a call may resume: same method, same cells
             store = self.out / f"runs_{_file_name(name)}_{self.search_cell_m:g}.sqlite"

@@ -47,7 +47,7 @@ def line_of_posts(
     Raises:
         BlastEnvError: If the scenario has no build zone or no vehicle.
     """
-    return _line_on(_TheVery(find_scenario(scenario))).layout
+    return _line_on(_ById(find_scenario(scenario))).layout
 
 
 def posts_and_wall(
@@ -67,27 +67,27 @@ def posts_and_wall(
         BlastEnvError: As for `line_of_posts`.
     """
     found = find_scenario(scenario)
-    posts = _line_on(_TheVery(found))
+    posts = _line_on(_ById(found))
     source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
     place = worst_places(found, source, posts.layout).charge(0)
     return wall_added_to(posts, place.position_m, NEAR_CHARGE).layout
 
 
 @dataclass(frozen=True, eq=False)
-class _TheVery:
+class _ById:
     """A scenario as a cache key, compared by identity, because comparison by value is slow."""
 
     scenario: Scenario
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _TheVery) and other.scenario is self.scenario
+        return isinstance(other, _ById) and other.scenario is self.scenario
 
     def __hash__(self) -> int:
         return id(self.scenario)
 
 
 @lru_cache(maxsize=4)
-def _line_on(very: _TheVery) -> LayoutState:
+def _line_on(very: _ById) -> LayoutState:
     """Return the line of posts of a scenario, cached for the two rules that need it."""
     scenario = very.scenario
     scenario.zone  # noqa: B018  # refuses a scenario without one

@@ -81,13 +81,13 @@ class PackageProposer:
         if not gain >= LEAST_GAIN:  # NaN: nothing arrives
             by = (
                 f"{by}: barriers bring little here, an expected reduction of {100.0 * gain:.1f} % "
-                f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_what_helps(problem)}"
+                f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_remedy(problem)}"
             )
             layout, gain = (), 0.0
         return replace(result, method=self.name, by=by, layout=layout, gain=gain, budget=budget)
 
 
-def _what_helps(problem: DesignProblem) -> str:
+def _remedy(problem: DesignProblem) -> str:
     """Return the stand-off that would halve the largest impulse, and the way to other help."""
     structures = problem.scenario.structures
     charges = [each.charge_against(problem.scenario, ()) for each in problem.threats]

@@ -450,7 +450,7 @@ def _between(scenario: Scenario, charge_m: PointM) -> BoolArray:
     between: BoolArray = (depth_m > 0.0) & (depth_m < distance_m)
     for each in scenario.structures:
         if each.protected:
-            between &= ~each.rectangle_m.meets_segments(charge_m, x_m, y_m)
+            between &= ~each.rectangle_m.intersects_segments(charge_m, x_m, y_m)
     return between
 
 

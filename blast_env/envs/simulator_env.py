@@ -49,7 +49,7 @@ _LEAST_OVERPRESSURE_PA: Final = -101_325.0
 _LATEST_S: Final = 60.0
 
 
-class Unfolding(ABC):
+class BlastInProgress(ABC):
     """A blast in progress, of particles or of gas.
 
     Attributes:
@@ -121,7 +121,7 @@ class Unfolding(ABC):
         """Return a picture of the present state."""
 
 
-class UnfoldingParticles(Unfolding):
+class ParticlesInProgress(BlastInProgress):
     """A blast of particles in progress.
 
     Args:
@@ -209,7 +209,7 @@ class UnfoldingParticles(Unfolding):
         )
 
 
-class UnfoldingGas(Unfolding):
+class GasInProgress(BlastInProgress):
     """A blast of gas dynamics in progress.
 
     Args:
@@ -305,7 +305,7 @@ def _unfolding_class(engine: Engine) -> Any:
     """
     if not engine.medium:
         raise BlastEnvError(f"engine {engine.name!r} runs no blasts: there is none to show")
-    return UnfoldingGas if engine.medium == "gas" else UnfoldingParticles
+    return GasInProgress if engine.medium == "gas" else ParticlesInProgress
 
 
 def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:
@@ -428,7 +428,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         self.action_space = spaces.Discrete(1)
         unfolding = _unfolding_class(self._engine)
         self.observation_space = unfolding.space(self.scenario, self._engine)
-        self._blast: Unfolding | None = None
+        self._blast: BlastInProgress | None = None
         self._target_s = 0.0
         self._window: Window | None = None
 
@@ -514,11 +514,11 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         """Leave out the window: a copy opens a new one."""
         return {**self.__dict__, "_window": None}
 
-    def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Unfolding:
+    def _lay_out(self, seed: int, options: Mapping[str, Any]) -> BlastInProgress:
         layout = check_layout(self.scenario, options.get("layout", self.layout))
         position_m = options.get("charge_position_m")
         fixed = ResetOptions.from_mapping({"charge_position_m": position_m})
         charge = fixed.charge(draw_threat(self.scenario, seed))
         blast = self._engine.blast(self.scenario, layout, seed, charge)
-        made: Unfolding = _unfolding_class(self._engine)(blast)
+        made: BlastInProgress = _unfolding_class(self._engine)(blast)
         return made

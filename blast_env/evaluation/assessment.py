@@ -31,7 +31,7 @@ from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.requirements import Requirement
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 from blast_env.site import AnyCharge, Scenario
 from blast_env.units import PA_PER_KPA
 from blast_env.values import count_of
@@ -211,7 +211,7 @@ def assess(
     layouts: Mapping[str, Layout],
     charges: Sequence[AnyCharge],
     engine: Engine,
-    progress: Tell | None = None,
+    progress: ProgressCallback | None = None,
     *,
     without_fallen: bool = False,
     cache: Path | None = None,
@@ -232,7 +232,7 @@ def assess(
     """
 
     def all_of(
-        engine: Engine, charges: Sequence[AnyCharge], tell: Tell | None
+        engine: Engine, charges: Sequence[AnyCharge], tell: ProgressCallback | None
     ) -> dict[str, Consequences]:
         found, evaluator = {}, BlastEvaluator(scenario, engine, cache=cache)
         for number, (name, layout) in enumerate(layouts.items()):

@@ -19,7 +19,7 @@ from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import charge_against
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import Tell
+from blast_env.runner import ProgressCallback
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.worst_places import nearest_point_m, stand_off_m
@@ -201,7 +201,7 @@ def capacity(
     evaluator: BlastEvaluator,
     layouts: Mapping[str, Layout],
     charges: Sequence[AnyCharge],
-    progress: Tell | None = None,
+    progress: ProgressCallback | None = None,
 ) -> list[AnswerPart]:
     """Return the largest masses and the least stand-offs that keep each level of protection.
 

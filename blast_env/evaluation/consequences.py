@@ -31,7 +31,7 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.standing import BayPlaces, Stood, bay_places, bay_standings
+from blast_env.evaluation.standing import BayPlaces, ReasonedStanding, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.gas.tables import means_by_wall
@@ -154,7 +154,7 @@ class BuildingResponse:
         return bay_places(self.site, [each.bay for each in self.on_cells.bays])
 
     @cached_property
-    def standings(self) -> tuple[Stood, ...]:
+    def standings(self) -> tuple[ReasonedStanding, ...]:
         """The standing of the load on each bay."""
         assert self.site is not None, "the response was made without a site"
         bays = [each.bay for each in self.on_cells.bays]
@@ -381,7 +381,7 @@ class Consequences:
         """Return the lowest level from the histories on the cells, which clip peaks."""
         return min(each.on_cells.level_of_protection for each in self.of(building))
 
-    def standing(self, building: str) -> Stood:
+    def standing(self, building: str) -> ReasonedStanding:
         """Return the standing of the load on the bay that decides under the worst charge."""
         worst = max(self.of(building), key=lambda each: each.severity)
         return worst.standings[worst.deciding_bay]

@@ -97,7 +97,7 @@ class ScreenedBay:
 
 
 @dataclass(frozen=True)
-class Screened:
+class ScreenedThreat:
     """The worst place of one threat.
 
     Attributes:
@@ -171,7 +171,7 @@ class Screening:
         storey_m: The most frequent height of a storey, the span of walls.
     """
 
-    threats: tuple[Screened, ...]
+    threats: tuple[ScreenedThreat, ...]
     components: Mapping[str, Glazing | Wall]
     present: frozenset[str]
     storey_m: float
@@ -184,7 +184,9 @@ class Screening:
             for each in self.threats
         }
 
-    def threat_row(self, threat: Screened, required: Sequence[Requirement]) -> tuple[str, ...]:
+    def threat_row(
+        self, threat: ScreenedThreat, required: Sequence[Requirement]
+    ) -> tuple[str, ...]:
         """Return the row of a threat under some requirements; see `THREAT_HEADERS`."""
         kept = all(threat.keeps(each) for each in required)
         needed_m = max(self.needed_m(threat.name, each) for each in required)
@@ -199,7 +201,7 @@ class Screening:
             Verdict.of(kept).word().lower() + (" (may be breached)" if threat.may_breach else ""),
         )
 
-    def stand_off_rows(self, threat: Screened) -> Iterator[tuple[str, ...]]:
+    def stand_off_rows(self, threat: ScreenedThreat) -> Iterator[tuple[str, ...]]:
         """Yield the rows of the components under a threat; see `STAND_OFF_HEADERS`."""
         for each in self.stand_offs[threat.name]:
             kind = "wall" if isinstance(each.component, Wall) else "glass"
@@ -489,7 +491,7 @@ def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
     return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
 
 
-def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen) -> Screened:
+def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen) -> ScreenedThreat:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
     peaks, impulses = seen.loads(places[0])
     numbers, parts = facade.kinds
@@ -505,7 +507,7 @@ def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen)
         response = respond([filled], *triangle(*load))
         away_m, is_seen = seen.away_m[worst, index], seen.seen[worst, index]
         bays.append(ScreenedBay(filled, float(away_m), bool(is_seen), *load, response))
-    return Screened(name, places[worst], len(places), tuple(bays))
+    return ScreenedThreat(name, places[worst], len(places), tuple(bays))
 
 
 def _tabulated(

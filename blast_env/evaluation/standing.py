@@ -47,7 +47,7 @@ class LoadStanding(IntEnum):
         return self.name.lower()
 
 
-class Stood(NamedTuple):
+class ReasonedStanding(NamedTuple):
     """A standing with its reason.
 
     Attributes:
@@ -64,18 +64,18 @@ class Stood(NamedTuple):
         return f"{self.standing.label} ({self.reason})"
 
 
-UNSTATED: Final = Stood(LoadStanding.OUTSIDE, "the engine states no checks")
+UNSTATED: Final = ReasonedStanding(LoadStanding.OUTSIDE, "the engine states no checks")
 """The standing of loads by engines that state none."""
 
 
-def worst_standing(stood: Iterable[Stood]) -> Stood:
+def worst_standing(stood: Iterable[ReasonedStanding]) -> ReasonedStanding:
     """Return the worst of some standings, the first of equal ones; `UNSTATED` of none."""
     return max(stood, key=lambda each: each.standing, default=UNSTATED)
 
 
 def standing_of(
     scaled_m: float, shaded: float, cells: float, is_known: bool, is_stepped: bool
-) -> Stood:
+) -> ReasonedStanding:
     """Return the standing of a load.
 
     Args:
@@ -87,20 +87,24 @@ def standing_of(
     """
     low, high = CHECKED_SCALED_DISTANCE
     if not is_known:
-        return Stood(LoadStanding.OUTSIDE, "impulse not yet captured at the end of the run")
+        return ReasonedStanding(
+            LoadStanding.OUTSIDE, "impulse not yet captured at the end of the run"
+        )
     if not low <= scaled_m <= high:
         words = f"scaled distance {scaled_m:.2g} m/kg^(1/3), checked from {low:g} to {high:g}"
-        return Stood(LoadStanding.OUTSIDE, words)
+        return ReasonedStanding(LoadStanding.OUTSIDE, words)
     if cells < CHECKED_CELLS:
         words = f"{cells:.2g} cells per m/kg^(1/3), checked from {CHECKED_CELLS:g}"
-        return Stood(LoadStanding.APPROXIMATE, words)
+        return ReasonedStanding(LoadStanding.APPROXIMATE, words)
     if is_stepped:
-        return Stood(LoadStanding.APPROXIMATE, "an oblique wall, modelled in steps")
+        return ReasonedStanding(LoadStanding.APPROXIMATE, "an oblique wall, modelled in steps")
     if shaded > 0.0:
         part = "" if shaded == 1.0 else f"{shaded:.0%} of it "
         words = f"{part}in the shade: compared with experiments and other codes"
-        return Stood(LoadStanding.VERIFIED, words)
-    return Stood(LoadStanding.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse")
+        return ReasonedStanding(LoadStanding.VERIFIED, words)
+    return ReasonedStanding(
+        LoadStanding.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse"
+    )
 
 
 class BayPlaces(NamedTuple):
@@ -151,7 +155,7 @@ def _outward(bay: Bay) -> tuple[float, float]:
 
 def bay_standings(
     site: BlastSite, bays: Sequence[Bay], cells: float, known: Mapping[str, bool]
-) -> tuple[Stood, ...]:
+) -> tuple[ReasonedStanding, ...]:
     """Return the standings of the loads on bays.
 
     Args:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 
 if TYPE_CHECKING:  # Numba takes half a second to import
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
@@ -64,7 +64,7 @@ class BlastFiles:
         elif self.gauge is not None and self.gauge not in names:
             raise UnknownNameError("gauge", self.gauge, names)
 
-    def run(self, blasts: Sequence[Any], progress: Tell) -> tuple[Any, ...]:
+    def run(self, blasts: Sequence[Any], progress: ProgressCallback) -> tuple[Any, ...]:
         """Run one or two blasts by one engine, and write their film; return their results.
 
         Args:

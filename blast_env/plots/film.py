@@ -28,7 +28,7 @@ from blast_env.plots.style import (
     charge_text,
     shown_until_s,
 )
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 from blast_env.units import MS_PER_S
 
 if TYPE_CHECKING:  # Numba takes half a second to import
@@ -49,7 +49,7 @@ def write_film(
     width_px: int | None = None,
     section: "VerticalSection | None" = None,
     recorders: "Recorders" = lambda _: (),
-    progress: Tell = lambda _: None,
+    progress: ProgressCallback = lambda _: None,
 ) -> tuple[Any, ...]:
     """Run a blast, or two side by side, and write a film.
 
@@ -108,14 +108,18 @@ def write_film(
     return footage.results
 
 
-def _with_progress(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator[Frame]:
+def _with_progress(
+    frames: Iterable[Frame], plan: FilmPlan, progress: ProgressCallback
+) -> Iterator[Frame]:
     """Yield frames, and report the share of the film so far."""
     for number, frame in enumerate(frames, start=1):
         yield frame
         progress(number / plan.frame_count)
 
 
-def _particle_footage(blasts: Sequence[Blast], width_px: int, progress: Tell) -> Footage:
+def _particle_footage(
+    blasts: Sequence[Blast], width_px: int, progress: ProgressCallback
+) -> Footage:
     """Run blasts of particles for their loads and arrival times; frames run them again.
 
     Each blast gets an equal part of the width, rounded down to an even one.

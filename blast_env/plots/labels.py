@@ -44,7 +44,7 @@ def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
 
 
 @dataclass(frozen=True)
-class Settled:
+class PlacedLabel:
     """A label and its position.
 
     Attributes:
@@ -68,7 +68,7 @@ def settled_labels(
     gap: float,
     far: float,
     others: Iterable[Rectangle] = (),
-) -> list[Settled]:
+) -> list[PlacedLabel]:
     """Place each label as near to its feature as occupied space allows.
 
     If there is no free position, a label takes the one that covers least.
@@ -92,7 +92,7 @@ def settled_labels(
         for each in features
         if each.kind.level >= Kinds.STRUCTURE.level or len(each.places_m) == 1
     ]
-    taken, found = [*solid, *others], list[Settled]()
+    taken, found = [*solid, *others], list[PlacedLabel]()
     for label, size in zip(labels, sizes, strict=True):
         own, inside = box(label.feature), room(label.feature)
         free_of = [each for each in taken if each != own] + [each.place for each in found]
@@ -101,7 +101,7 @@ def settled_labels(
         if middle is not None and inside is not None and inside.contains(middle):
             tried.insert(0, (middle, free_of))
         place = best_place(tried, within)
-        found.append(Settled(label, place, _leader(own, place, far)))
+        found.append(PlacedLabel(label, place, _leader(own, place, far)))
     return found
 
 

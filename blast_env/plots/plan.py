@@ -449,7 +449,9 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
         ((left, y), (right, y)) if way.between == "left_right" else ((x, bottom), (x, top))
         for x, y in places
     ]
-    free = (ends for ends in arrows if not any(each.meets_segment(*ends) for each in structures_m))
+    free = (
+        ends for ends in arrows if not any(each.intersects_segment(*ends) for each in structures_m)
+    )
     ends = next(free, arrows[0])
     yield Feature(Kinds.ACCESS_WAY, tuple(rounded_m(*end) for end in ends), way.description)
 

@@ -28,7 +28,7 @@ from blast_env.plots.pressure_frames import (
     default_section,
 )
 from blast_env.plots.style import barrier_text, nice_ceiling
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 from blast_env.site.blast_site import BlastSite
 from blast_env.statistics import counted_parts
 from blast_env.units import PA_PER_KPA
@@ -49,7 +49,7 @@ def pressure_footage(
     width_px: int,
     section: VerticalSection | None,
     recorders: Recorders,
-    progress: Tell,
+    progress: ProgressCallback,
 ) -> Footage:
     """Run blasts and record their overpressure in plan and in a section; see `write_film`."""
     check_comparable(blasts)
@@ -139,7 +139,7 @@ def _counting_peaks_pa(result: GasResult) -> FloatArray:
 def record_planes(
     blast: GasBlast,
     section: VerticalSection | None = None,
-    progress: Tell = lambda _: None,
+    progress: ProgressCallback = lambda _: None,
     recorders: Recorders = lambda _: (),
     height_m: float = PLAN_HEIGHT_M,
 ) -> PressureShot:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
-from blast_env.evaluation.standing import Stood
+from blast_env.evaluation.standing import ReasonedStanding
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
@@ -155,7 +155,7 @@ class TargetLoad:
     duration_s: float
     known: bool
     flagged: bool
-    stood: Stood
+    stood: ReasonedStanding
 
 
 @dataclass(frozen=True, eq=False)

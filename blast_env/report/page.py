@@ -241,7 +241,7 @@ def _standings(study: Study, threat: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Sureness:
+class Confidence:
     """How sure the level of protection is, and up to which charge.
 
     Attributes:
@@ -255,7 +255,7 @@ class Sureness:
     masses: tuple[str, ...]
 
 
-def _sureness(study: Study) -> Sureness | None:
+def _sureness(study: Study) -> Confidence | None:
     """Return how sure the level is; `None` without buildings with a facade."""
     if not study.protected.responses:
         return None
@@ -270,7 +270,7 @@ def _sureness(study: Study) -> Sureness | None:
         bound = "" if is_found else ("at least " if kept else "less than ")
         masses.append(f"{threat.name} {bound}{kg:.3g} kg TNT")
     bare_text = probability_text(unprotected.of(target), len(unprotected.levels))
-    return Sureness(protected.words(target), bare_text, tuple(masses))
+    return Confidence(protected.words(target), bare_text, tuple(masses))
 
 
 REFERENCES: Final = (

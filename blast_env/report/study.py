@@ -35,7 +35,7 @@ from blast_env.report.loads import (
     targets_of,
 )
 from blast_env.report.outcomes import ItemWorth, Limit, LoadPair, check_limits
-from blast_env.report.threats import asked_threats, chief_threats, other_places
+from blast_env.report.threats import chief_threats, other_places, requested_threats
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import as_completed
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
@@ -225,7 +225,7 @@ def run_study(
         raise BlastEnvError("the layout is empty: there is nothing to report on")
     targets = targets_of(scenario)
     check_limits(options.limits, targets)
-    asked = asked_threats(scenario, options.charges)
+    asked = requested_threats(scenario, options.charges)
     for threat in asked:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
@@ -243,7 +243,7 @@ def run_study(
         places = runs.other_places()
         part = ""
     except KeyboardInterrupt:
-        options = runs.options_of_what_is_done()
+        options = runs.completed_options()
         progress(f"stopped before: {part}", 1.0)
     coarse, fine = options.cells
     return Study(
@@ -330,7 +330,7 @@ def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[LoadCase, ...
     Those given, or stand-ins: one of the places of each source.
     """
     if options.charges:
-        return asked_threats(scenario, options.charges)
+        return requested_threats(scenario, options.charges)
     places = other_places(scenario, options.places)
     return chief_threats(places, lambda _: Severity(), options.most_threats)
 
@@ -416,7 +416,7 @@ class Runs:
     def _layouts(self) -> tuple[Layout, Layout]:
         return (), self.layout
 
-    def options_of_what_is_done(self) -> StudyOptions:
+    def completed_options(self) -> StudyOptions:
         """Return the options of a report on the finished cells, perhaps the coarser ones alone.
 
         Raises:

@@ -51,7 +51,7 @@ def chief_threats(
     )
 
 
-def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[LoadCase, ...]:
+def requested_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[LoadCase, ...]:
     """Return the charges given by the user; refuse one that is out of bounds or not clear."""
     scenario.with_possible_charges(charges)
     return tuple(

@@ -11,9 +11,8 @@ from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.sites.ranges import (
     MARGIN_M,
     Amounts,
-    Apart,
     Counts,
-    Drawn,
+    DrawnParts,
     Draws,
     Gaps,
     Lengths,
@@ -22,6 +21,7 @@ from blast_env.sites.ranges import (
     Ranges,
     Shifts,
     Side,
+    SpacedObstacle,
     Span,
     WholeSpan,
     ZoneSide,
@@ -182,7 +182,7 @@ class ItemSiteRanges(Ranges):
             raise ScenarioError("ItemSiteRanges", problems)
         return self
 
-    def drawn(self, draws: Draws) -> Drawn:
+    def drawn(self, draws: Draws) -> DrawnParts:
         """Draw a site."""
         has_vehicle = draws.happens(self.vehicle_probability)
         plan = _draw_plan(draws, self)
@@ -202,7 +202,7 @@ class ItemSiteRanges(Ranges):
         front_m = plan.front_m - (0.0 if has_vehicle else _ROAD_M)
         what = {"vehicle": "a vehicle", "segment": "a car"}.get(charge["kind"], "parked cars")
         description = f"A generated site: {what}, at most {front_m:g} m from what is protected."
-        return Drawn(description, sections)
+        return DrawnParts(description, sections)
 
 
 LARGE_SIDE_M: Final = 60.0
@@ -390,8 +390,8 @@ def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> lis
         size_m = (draws.length_m(ranges.shed_side_m), draws.length_m(ranges.shed_side_m))
         far_m = ranges.side_m - MARGIN_M
         area = Rectangle(2.0 * _ROAD_M, MARGIN_M, far_m, far_m)
-        others = [Apart(each, _BETWEEN_M) for each in plan.buildings]
-        shed = draw_place(draws, area, size_m, [*others, Apart(plan.zone, 0.0)])
+        others = [SpacedObstacle(each, _BETWEEN_M) for each in plan.buildings]
+        shed = draw_place(draws, area, size_m, [*others, SpacedObstacle(plan.zone, 0.0)])
         if shed is not None:
             structures.append(structure("shed", shed, height_m=STOREY_M))
     return structures
@@ -463,7 +463,7 @@ def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list
             places.append(("the path to the door must stay open", path))
     for _ in range(draws.count(ranges.trees)):
         side_m = draws.length_m(ranges.tree_side_m)
-        others = [Apart(each, 0.0) for _, each in places]
+        others = [SpacedObstacle(each, 0.0) for _, each in places]
         tree = draw_place(draws, yard(zone, building), (side_m, side_m), others)
         if tree is not None:
             places.append(("tree", tree))

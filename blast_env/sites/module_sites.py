@@ -11,9 +11,8 @@ from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.sites.ranges import (
     MARGIN_M,
     Amounts,
-    Apart,
     Counts,
-    Drawn,
+    DrawnParts,
     Draws,
     Gaps,
     Lengths,
@@ -22,6 +21,7 @@ from blast_env.sites.ranges import (
     Ranges,
     Shifts,
     Side,
+    SpacedObstacle,
     Span,
     ZoneSide,
     draw_path,
@@ -133,7 +133,7 @@ class SiteRanges(Ranges):
             raise ScenarioError("SiteRanges", problems)
         return self
 
-    def drawn(self, draws: Draws) -> Drawn:
+    def drawn(self, draws: Draws) -> DrawnParts:
         """Draw a site."""
         plan = _draw_plan(draws, self)
         charge = source(plan.threat, draws.amount(self.tnt_kg, 0))
@@ -152,7 +152,7 @@ class SiteRanges(Ranges):
             f" {building.left - threat.right:g} m from a"
             f" {'road' if threat.left == threat.right else 'parking area'} along the {{side}} side."
         )
-        return Drawn(description, sections)
+        return DrawnParts(description, sections)
 
 
 @dataclass(frozen=True)
@@ -220,9 +220,9 @@ def _draw_neighbour(draws: Draws, ranges: SiteRanges, plan: _Plan) -> Rectangle 
     size_m = (draws.length_m(ranges.neighbour_side_m), draws.length_m(ranges.neighbour_side_m))
     area = Rectangle(MARGIN_M, MARGIN_M, plan.building.right, ranges.side_m - MARGIN_M)
     others = (
-        Apart(plan.building, NEIGHBOUR_DISTANCE_M),
-        Apart(plan.threat, NEIGHBOUR_DISTANCE_M),
-        Apart(plan.zone, 0.0),
+        SpacedObstacle(plan.building, NEIGHBOUR_DISTANCE_M),
+        SpacedObstacle(plan.threat, NEIGHBOUR_DISTANCE_M),
+        SpacedObstacle(plan.zone, 0.0),
     )
     return draw_place(draws, area, size_m, others)
 
@@ -272,7 +272,7 @@ def _draw_keep_outs(draws: Draws, ranges: SiteRanges, plan: _Plan) -> list[dict[
     trees = draws.count(ranges.trees)
     squares += [("tree", draws.length_m(ranges.tree_side_m)) for _ in range(trees)]
     for reason, side_m in squares:
-        others = [Apart(each, 0.0) for _, each in places]
+        others = [SpacedObstacle(each, 0.0) for _, each in places]
         place = draw_place(draws, yard(plan.zone, plan.building), (side_m, side_m), others)
         if place is not None:
             places.append((reason, place))

@@ -69,7 +69,7 @@ class PositivePhases:
 
 
 @dataclass(frozen=True)
-class BothLoads:
+class LoadsByDefinition:
     """The loads of a blast on the protected structures by both definitions.
 
     Loads are means over the cell faces of the counted walls.
@@ -89,7 +89,9 @@ class BothLoads:
     end_s: float
 
 
-def both_loads(scenario: Scenario, layout: Layout, engine: GasEngine, until_s: float) -> BothLoads:
+def both_loads(
+    scenario: Scenario, layout: Layout, engine: GasEngine, until_s: float
+) -> LoadsByDefinition:
     """Run a blast until a time, and again until its loads are known."""
     phases = PositivePhases()
 
@@ -108,7 +110,7 @@ def both_loads(scenario: Scenario, layout: Layout, engine: GasEngine, until_s: f
     )
     short = GasBlast(scenario, layout, engine=engine).run()
     reached_s = run.loads.impulse_time_s[counts]
-    return BothLoads(
+    return LoadsByDefinition(
         positive_pa_s=float(phases.impulse_pa_s[counts].mean()),
         impulse_pa_s=float(run.loads.impulse_pa_s[counts].mean()),
         reached_s=float(reached_s.mean()),

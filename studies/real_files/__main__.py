@@ -11,7 +11,7 @@ import typer
 
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from studies.real_files.survey import files_of, survey
 
 _WORDS = 100
@@ -23,7 +23,7 @@ def main(folder: Annotated[Path, typer.Argument(help="Folder of maps and drawing
         files = files_of(folder)
         if not files:
             raise BlastEnvError(f"{folder}: has no map and no drawing")
-    sums: Counter[tuple[Deed, str]] = Counter()
+    sums: Counter[tuple[Fate, str]] = Counter()
     refusals: Counter[str] = Counter()
     for path in files:
         found = survey(path)
@@ -31,14 +31,14 @@ def main(folder: Annotated[Path, typer.Argument(help="Folder of maps and drawing
         if found.refusal:
             refusals[shortened(found.refusal, _WORDS)] += 1
         counts = {
-            deed: sum(count for (other, _), count in found.sums.items() if other is deed)
-            for deed in Deed
+            fate: sum(count for (other, _), count in found.sums.items() if other is fate)
+            for fate in Fate
         }
-        words = found.refusal or ", ".join(f"{deed} {count}" for deed, count in counts.items())
+        words = found.refusal or ", ".join(f"{fate} {count}" for fate, count in counts.items())
         print_line(f"{path.relative_to(folder)}: {shortened(words, 2 * _WORDS)}")
     print_line(f"imported {len(files) - refusals.total()} of {len(files)} files")
-    for (deed, kind), count in sorted(sums.items(), key=lambda each: (each[0][0], -each[1])):
-        print_line(f"{deed}: {kind}: {count}")
+    for (fate, kind), count in sorted(sums.items(), key=lambda each: (each[0][0], -each[1])):
+        print_line(f"{fate}: {kind}: {count}")
     for refusal, count in refusals.most_common():
         print_line(f"refused: {refusal}: {count}")
 

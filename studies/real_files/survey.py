@@ -11,7 +11,7 @@ import shapely
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.io.importing.convert import read_map
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import WGS84, SiteMap
 from blast_env.io.importing.things import Role, Thing, things_of
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
@@ -32,12 +32,12 @@ class Survey:
     Attributes:
         path: The file.
         refusal: Why it was refused; an empty string if it was not.
-        sums: Number of objects by deed and kind.
+        sums: Number of objects by fate and kind.
     """
 
     path: Path
     refusal: str
-    sums: Counter[tuple[Deed, str]]
+    sums: Counter[tuple[Fate, str]]
 
 
 def survey(path: Path) -> Survey:
@@ -76,7 +76,7 @@ def _surveyed(path: Path) -> Survey:
             if "charge" not in str(refusal):
                 raise
         else:
-            kinds = ((each.deed, each.kind) for each in imported.ledger.entries)
+            kinds = ((each.fate, each.kind) for each in imported.ledger.entries)
             return Survey(path, "", Counter(kinds))
     assert error is not None
     raise error

@@ -20,7 +20,7 @@ from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Running, Workers, settle
 from blast_env.app.placing import plain
 from blast_env.app.records import (
-    Blasted,
+    BlastedLayout,
     BlastRecord,
     blast_key,
     comparison,
@@ -28,7 +28,7 @@ from blast_env.app.records import (
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import verdict_table
-from blast_env.app.work import Status, Teller, read_status, write_status
+from blast_env.app.work import Status, StatusWriter, read_status, write_status
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, StructureLoad, evaluate_layout
@@ -112,7 +112,7 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
 
     unprotected = {"near": blast("near", (), 400.0, 100.0), "far": blast("far", (), 100.0, 50.0)}
     own = {"near": blast("near", WALL, 200.0, 50.0), "far": blast("far", WALL, 100.0, 100.0)}
-    layouts = [Blasted("no barrier", 0.0, unprotected), Blasted("A", 6.0, own)]
+    layouts = [BlastedLayout("no barrier", 0.0, unprotected), BlastedLayout("A", 6.0, own)]
     table = comparison(layouts, ["near", "far"], site)
     rows = {(row.layout, row.threat): row for row in rows_of(table)}
     counted = {key: float(row.counts) for key, row in rows.items()}
@@ -487,7 +487,7 @@ def test_work_ends_with_a_server_that_is_killed_and_keeps_its_best(tmp_path: Pat
     assert wait(Workers(most=0), folder, "stopped").layout is not None
 
 
-def sleeping(_: Teller) -> None:
+def sleeping(_: StatusWriter) -> None:
     """Stand for work that lasts."""
     sleep(60.0)
 

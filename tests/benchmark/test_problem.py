@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from blast_env.benchmark import (
     DEFINITIONS,
-    Asked,
     BenchmarkProblem,
     Definition,
     LayoutSpace,
+    RunGrid,
     Submission,
     make,
     play,
@@ -87,11 +87,11 @@ def test_the_budget_ends_a_method_with_its_best_layout() -> None:
             own.evaluate([Piece(row, 0, "low_wall", True)])
         return ()
 
-    (run,) = play(endless, Asked([problem], (5,)))
+    (run,) = play(endless, RunGrid([problem], (5,)))
     assert run.layout == (Piece(4, 0, "low_wall", True),)
     assert [blasts for blasts, _ in run.curve] == [1, 2, 3, 4, 5]
     with pytest.raises(BudgetError):
-        play(endless, Asked([problem], (0,)))
+        play(endless, RunGrid([problem], (0,)))
 
 
 def test_a_method_without_new_questions_ends() -> None:
@@ -99,13 +99,13 @@ def test_a_method_without_new_questions_ends() -> None:
         while True:
             own.evaluate(WALL)
 
-    (run,) = play(stubborn, Asked([problem], (5,)))
+    (run,) = play(stubborn, RunGrid([problem], (5,)))
     assert (run.blasts, run.layout) == (1, tuple(WALL))
 
 
 @pytest.mark.parametrize("asked", ["control_room-known-v2", HIDDEN])
 def test_the_curve_of_a_search_ends_at_its_layout(asked: str | Definition) -> None:
-    (run,) = play(find_method("genetic"), Asked([lambda budget: problem(budget, asked)], (12,)))
+    (run,) = play(find_method("genetic"), RunGrid([lambda budget: problem(budget, asked)], (12,)))
     blasts, shares = zip(*run.curve, strict=True)
     assert blasts[-1] <= run.blasts
     assert shares[-1] == pytest.approx(problem(0, asked).judged(run.layout), abs=1e-5)
@@ -184,7 +184,7 @@ def test_sites_of_a_secret_are_the_same_again_and_of_no_other() -> None:
 
 
 def test_runs_go_on_where_they_were(tmp_path: Path) -> None:
-    asked = Asked([lambda budget: problem(budget)], (0, 4), range(2))
+    asked = RunGrid([lambda budget: problem(budget)], (0, 4), range(2))
     calls = []
 
     def wall(own: BenchmarkProblem, seed: int) -> Layout:

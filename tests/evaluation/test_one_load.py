@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.app.records import Blasted, BlastRecord, comparison
+from blast_env.app.records import BlastedLayout, BlastRecord, comparison
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.oblique_walls import stepped_buildings
@@ -106,7 +106,7 @@ def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
         seconds=0.0,
         repeat={},
     )
-    table = comparison([Blasted("no barrier", 0.0, {"T1": record})], ["T1"], hall)
+    table = comparison([BlastedLayout("no barrier", 0.0, {"T1": record})], ["T1"], hall)
     together, building = rows_of(table)
     assert building.structure == "hall"
     for row in (together, building):

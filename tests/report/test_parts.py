@@ -18,10 +18,10 @@ from blast_env.report.outcomes import check_limits
 from blast_env.report.peaks import CountedPeak, PeakSource
 from blast_env.report.study import Runs
 from blast_env.report.threats import (
-    asked_threats,
     chief_threats,
     other_places,
     place_text,
+    requested_threats,
 )
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.blast_site import Charge
@@ -111,9 +111,9 @@ def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
 
 
 def test_threats_that_are_asked_for_must_be_clear() -> None:
-    assert asked_threats(small_hut(), (Charge((2.0, 3.0), 5.0),))[0].name == "T1"
+    assert requested_threats(small_hut(), (Charge((2.0, 3.0), 5.0),))[0].name == "T1"
     with pytest.raises(ScenarioError, match="hut"):
-        asked_threats(small_hut(), (Charge((6.5, 4.0), 5.0),))
+        requested_threats(small_hut(), (Charge((6.5, 4.0), 5.0),))
 
 
 def test_structures_of_a_building_are_one_target() -> None:

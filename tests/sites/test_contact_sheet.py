@@ -46,4 +46,4 @@ def test_the_access_way_is_drawn_where_no_structure_stands(sites: tuple[Scenario
         ends = np.asarray(way.get_path().vertices)[[0, 2]].tolist()
         start, end = ((x, y) for x, y in ends)
         for structure in site.structures:
-            assert not structure.rectangle_m.meets_segment(start, end)
+            assert not structure.rectangle_m.intersects_segment(start, end)

@@ -24,7 +24,7 @@ from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.store import BlastStore
-from blast_env.runner import workers_told
+from blast_env.runner import configured_workers
 from blast_env.values import checked_seed, whole_number
 
 _Env = gym.Env[Array, np.int64]
@@ -305,7 +305,7 @@ def _parallel(
 ) -> VecEnv:
     count = configuration.hyperparameters.n_envs
     engine = configuration.settings.blast_engine
-    if workers_told() > 1 or (count > 1 and engine.at_once > 1):
+    if configured_workers() > 1 or (count > 1 and engine.at_once > 1):
         return EnvironmentMaker(configuration, source, 0, blasts).batch()
     makers = [EnvironmentMaker(configuration, source, index, blasts) for index in range(count)]
     if count == 1:

@@ -8,7 +8,7 @@ from nicegui import background_tasks, run, ui
 
 from blast_env.app.page.tables import address_of, cells, columns_of, text_table
 from blast_env.app.records import TOGETHER, BlastRecord
-from blast_env.app.session import BARE, Session, Shown
+from blast_env.app.session import BARE, Session, ShownLayout
 from blast_env.evaluation import LoadCase
 
 _FILM: Final = "film"
@@ -34,7 +34,7 @@ class _Found:
         damage: Names of the buildings whose damage can be drawn, by the labels of these pictures.
     """
 
-    shown: Shown
+    shown: ShownLayout
     record: BlastRecord
     pictures: Mapping[str, str]
     damage: Mapping[str, str]
@@ -132,7 +132,7 @@ class ResultsView:
         self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes([each.record for each in found])
 
-    def _found(self, shown: Sequence[Shown], threat: LoadCase) -> Iterator[_Found]:
+    def _found(self, shown: Sequence[ShownLayout], threat: LoadCase) -> Iterator[_Found]:
         """Yield every blast that is complete, with the addresses of its pictures."""
         session = self._session
         for each in shown:
@@ -179,7 +179,9 @@ class ResultsView:
                 building = found.damage[self._what]
                 background_tasks.create(self._draw(image, found.shown, threat, building))
 
-    async def _draw(self, image: ui.element, shown: Shown, threat: LoadCase, building: str) -> None:
+    async def _draw(
+        self, image: ui.element, shown: ShownLayout, threat: LoadCase, building: str
+    ) -> None:
         png = await run.io_bound(self._session.damage_png, shown, threat, building)
         if png is not None and not image.is_deleted:
             image.props(f'src="{address_of(png)}"')

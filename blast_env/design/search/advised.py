@@ -31,7 +31,7 @@ from blast_env.geometry import Layout, layout_words
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import Tell, share_of
+from blast_env.runner import ProgressCallback, share_of
 from blast_env.site import Scenario
 from blast_env.site.content import SCHEMA_VERSION
 
@@ -47,7 +47,7 @@ _HEADERS: Final = (
 )
 
 
-def asked_site(
+def site_with_target(
     scenario: Scenario,
     level: LevelOfProtection,
     target_probability: float | None = None,
@@ -137,7 +137,7 @@ class AdviceJudge:
 
 
 @dataclass(frozen=True, eq=False)
-class Advised:
+class AdviceResult:
     """The best layouts of all kinds, and the verdicts on them.
 
     Attributes:
@@ -234,8 +234,8 @@ def advised(
     budget: int,
     rounds: int = ROUNDS,
     seed: int = 0,
-    progress: Tell | None = None,
-) -> Advised:
+    progress: ProgressCallback | None = None,
+) -> AdviceResult:
     """Return the best layout of each kind of measures, with the verdicts on them.
 
     Args:
@@ -263,4 +263,4 @@ def advised(
                 margin=margin,
             )
         )
-    return Advised(judge, found)
+    return AdviceResult(judge, found)

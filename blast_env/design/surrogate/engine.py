@@ -13,7 +13,7 @@ from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate,
 from blast_env.design.surrogate.walls import Memory, SurrogateSite, site_of
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
-from blast_env.evaluation.standing import LoadStanding, Stood
+from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
@@ -21,7 +21,7 @@ from blast_env.site import AnyCharge, Scenario
 SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""
 
-_GUESSED: Final = Stood(LoadStanding.APPROXIMATE, "a guess of gas dynamics")
+_GUESSED: Final = ReasonedStanding(LoadStanding.APPROXIMATE, "a guess of gas dynamics")
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 

@@ -216,7 +216,7 @@ def _stop(
         while last < points and _flat_m2(points_m[first], points_m[last]) == 0.0:
             last += 1
         end_m = points_m[first]
-        straight = met[: _meet(start_m, end_m, solids, met)]
+        straight = met[: _intersect(start_m, end_m, solids, met)]
         for point in range(first, last):
             if is_straight_open[point] and _is_stopped(start_m[2], points_m[point, 2], straight):
                 is_straight_open[point] = False
@@ -224,8 +224,8 @@ def _stop(
         for station in range(stations):
             for aside in range(asides):
                 corner_m = by_m[first, station, aside]
-                near = _meet(start_m, corner_m, solids, met)
-                far = near + _meet(corner_m, end_m, solids, met[near:])
+                near = _intersect(start_m, corner_m, solids, met)
+                far = near + _intersect(corner_m, end_m, solids, met[near:])
                 if far == 0:
                     continue
                 to, beyond = met[:near], met[near:far]
@@ -245,7 +245,7 @@ def _stop(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _meet(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
+def _intersect(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
     """Record where a straight line in plan enters and leaves solids, with their heights.
 
     Uses the slab method; returns the number of solids on the line.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.standing import STANDING_COLUMNS, Stood, bay_standings
+from blast_env.evaluation.standing import STANDING_COLUMNS, ReasonedStanding, bay_standings
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
@@ -202,7 +202,7 @@ def unjudged_walls(
 
 
 def bay_rows(
-    found: FacadeResponse, known: Mapping[str, bool], standings: Sequence[Stood]
+    found: FacadeResponse, known: Mapping[str, bool], standings: Sequence[ReasonedStanding]
 ) -> list[dict[str, object]]:
     """Return the response of bays, one row each, with the keys of `LOADED_BAY_COLUMNS`.
 

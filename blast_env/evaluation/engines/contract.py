@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
-from blast_env.evaluation.standing import UNSTATED, Stood, worst_standing
+from blast_env.evaluation.standing import UNSTATED, ReasonedStanding, worst_standing
 from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.buildings import LevelOfProtection
@@ -80,7 +80,7 @@ class StructureLoad:
     area_m2: float | None = None
     response: float | None = None
     worst_damage: float | None = None
-    stood: Stood = UNSTATED
+    stood: ReasonedStanding = UNSTATED
     impulse_sim: float | None = None
 
     @classmethod

@@ -33,7 +33,7 @@ from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.evaluation.standing import (
     STANDING_COLUMNS,
     LoadStanding,
-    Stood,
+    ReasonedStanding,
     standing_of,
     worst_standing,
 )
@@ -427,18 +427,18 @@ class GasResult:
             for scaled in [self._scaled(index)]
         )
 
-    def standing(self, names: Collection[str]) -> Stood:
+    def standing(self, names: Collection[str]) -> ReasonedStanding:
         """Return the standing of the load on a structure, or on several that form a building."""
         counted = counted_parts([each for each in self.run.site.structures if each.name in names])
         return worst_standing(self._stood[each.name] for each in counted)
 
     @cached_property
-    def _stood(self) -> dict[str, Stood]:
+    def _stood(self) -> dict[str, ReasonedStanding]:
         """The standing of the load on the counted walls of each structure, by name."""
         structures = enumerate(self.run.site.structures)
         return {each.name: self._standing_of(k) for k, each in structures if not each.is_barrier}
 
-    def _standing_of(self, index: int) -> Stood:
+    def _standing_of(self, index: int) -> ReasonedStanding:
         run, scenario = self.run, self.blast.scenario
         outline = run.site.structures[index]
         own = self._walls(index)
@@ -446,7 +446,9 @@ class GasResult:
         outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
         if run.solver.floored_cells:
-            return Stood(LoadStanding.APPROXIMATE, _FLOORED.format(run.solver.floored_cells))
+            return ReasonedStanding(
+                LoadStanding.APPROXIMATE, _FLOORED.format(run.solver.floored_cells)
+            )
         return standing_of(
             run.site.scaled_distance(outline),
             1.0 - float(seen.mean()) if len(own) else 0.0,

@@ -21,7 +21,7 @@ from blast_env.evaluation.engines.contract import (
     StructureLoad,
     find_engine,
 )
-from blast_env.evaluation.standing import LoadStanding, Stood
+from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.geometry import Element, layout_text
 from blast_env.particles.calibration.model import (
     Calibration,
@@ -46,7 +46,9 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
     from blast_env.particles.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 200
-_CALIBRATED: Final = Stood(LoadStanding.APPROXIMATE, "calibrated particles, which overrate walls")
+_CALIBRATED: Final = ReasonedStanding(
+    LoadStanding.APPROXIMATE, "calibrated particles, which overrate walls"
+)
 
 PARTICLES_OVERRATE: Final = (
     "The particle model overrates barriers: on 'courtyard' it predicted 4.0 times the reduction of"
@@ -310,7 +312,7 @@ class BlastResult:
                     notes=scaled.notes,
                     stood=_CALIBRATED
                     if scaled.in_range
-                    else Stood(LoadStanding.OUTSIDE, "; ".join(scaled.notes)),
+                    else ReasonedStanding(LoadStanding.OUTSIDE, "; ".join(scaled.notes)),
                     impulse_sim=each.impulse,
                 )
                 for each in structures

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
 from blast_env.io.importing.placing import PlacedSite
@@ -93,7 +93,7 @@ def _sound(site: PlacedSite, thing: Thing) -> Thing:
         reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()
         raise BlastEnvError(f"{what} is not sound: {reason}; --repair corrects such outlines")
     kind = "outlines that cross themselves, corrected"
-    site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name)
+    site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name)
     return replace(thing, geometry=mended(thing.geometry, what))
 
 
@@ -115,7 +115,7 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
             found.append(replace(part, is_part=False))
         elif part.height_m is None or part.geometry.area < site.options.least_area_m2:
             kind = "parts of buildings, small or without a height"
-            site.ledger.add(Deed.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
+            site.ledger.add(Fate.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
         else:
             parts.setdefault(own, []).append(part)
     for index, whole in enumerate(wholes):
@@ -123,7 +123,7 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
         lowest_m = min((each.height_m for each in own_parts if each.height_m), default=None)
         if lowest_m is not None and whole.height_m is None:
             kind, detail = "heights of buildings with parts", f"{lowest_m:g} m, as the lowest"
-            site.ledger.add(Deed.GUESSED, kind, whole.place, whole.name, detail)
+            site.ledger.add(Fate.GUESSED, kind, whole.place, whole.name, detail)
             whole = replace(whole, height_m=lowest_m)
         group = whole.part_of or (whole.place if own_parts else "")
         found.append(replace(whole, part_of=group))
@@ -182,7 +182,7 @@ def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
                 kind, shape = f"{kind}, covered", shapely.Polygon()
             else:
                 kind = f"{kind}, overlap left out"
-            site.ledger.add(Deed.MERGED, kind, thing.place, thing.name, detail)
+            site.ledger.add(Fate.MERGED, kind, thing.place, thing.name, detail)
         left[k] = replace(thing, geometry=shape)
     return [*found, *(each for each in left if not each.geometry.is_empty)]
 
@@ -217,16 +217,16 @@ def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:
     for thing in buildings:
         if thing.carries and thing.height_m is None:
             kind = "terraces without a height, on which nothing stands"
-            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name)
+            site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name)
             thing = replace(thing, carries=False)
         if thing.height_m is None:
             height_m, kind, detail = guess.of(thing)
-            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name, detail)
+            site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name, detail)
             thing = replace(thing, height_m=height_m)
         if thing.kind in _ROOFS and thing.base_m == 0.0 and thing.height_m is not None:
             base_m = max(thing.height_m - MODULE_SIDE_M, 0.0)
             kind = "roofs on posts, open below"
-            site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name, f"from {base_m:g} m")
+            site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name, f"from {base_m:g} m")
             thing = replace(thing, base_m=base_m)
         found.append(thing)
     return found

@@ -19,7 +19,7 @@ from blast_env.io.importing.dxf import read_dxf
 from blast_env.io.importing.fitting import FittedBuilding, fit_buildings, plain_name
 from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
-from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Deed, Ledger
+from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Fate, Ledger
 from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
@@ -183,7 +183,7 @@ def _others(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> dict[str
         if is_used:
             used[each.place] = str(each.role)
         else:
-            site.ledger.add(Deed.PASSED, why, each.place, each.name)
+            site.ledger.add(Fate.PASSED, why, each.place, each.name)
     return used
 
 

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,
@@ -110,7 +110,7 @@ def _document(site_map: SiteMap) -> Drawing:
         kind = "damaged files, recovered as far as possible"
         count = len(auditor.errors) + len(auditor.fixes)
         faults = f"{count} faults mended or skipped" if count else ""
-        site_map.ledger.add(Deed.GUESSED, kind, site_map.path.name, detail=faults)
+        site_map.ledger.add(Fate.GUESSED, kind, site_map.path.name, detail=faults)
         return document
 
 
@@ -126,7 +126,7 @@ def _set_scales(site_map: SiteMap, document: Drawing) -> None:
                     insert.dxf.set(name, 1.0)
                     kind = "inserts with a scale of 0, taken as 1"
                     place = f"INSERT {insert.dxf.get('handle')}"
-                    site_map.ledger.add(Deed.GUESSED, kind, place, detail=name)
+                    site_map.ledger.add(Fate.GUESSED, kind, place, detail=name)
 
 
 def _check_entities(path: Path, document: Drawing) -> None:

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.geometry import Rectangle
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.outlines import areas_of, check_outlines, walls_of
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
@@ -167,7 +167,7 @@ def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
             fitted.append((each, own))
         else:
             kind = "buildings below others, or that cover the centre of no module"
-            site.ledger.add(Deed.LEFT_OUT, kind, each.place, each.name)
+            site.ledger.add(Fate.LEFT_OUT, kind, each.place, each.name)
     count = sum(len(own) for _, own in fitted)
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} structures, must take")
@@ -190,7 +190,7 @@ def _fitted(
     if off.area_share > _MUCH_AREA or off.outline_m > _FAR_M:
         detail = f"{off.area_share:.1%} of its area, {off.outline_m:.2f} m of its outline"
         kind = "shapes of buildings that modules miss by much"
-        site.ledger.add(Deed.GUESSED, kind, thing.place, thing.name or name, detail)
+        site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name or name, detail)
     height_m = None
     base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
     if thing.height_m is not None:
@@ -227,11 +227,11 @@ def _kept(site: PlacedSite) -> list[Thing]:
     for thing, outline, shape in zip(site.of_role(Role.BUILDING), outlines, inside, strict=True):
         area = areas_of(shape)
         if shape.is_empty:
-            site.ledger.add(Deed.PASSED, OUTSIDE, thing.place, thing.name)
+            site.ledger.add(Fate.PASSED, OUTSIDE, thing.place, thing.name)
         elif area.area < least_m2:
             kind = f"buildings of less than {least_m2:g} m2 (--least-area)"
             detail = f"{area.area:.1f} m2 on the site"
-            site.ledger.add(Deed.LEFT_OUT, kind, thing.place, thing.name, detail)
+            site.ledger.add(Fate.LEFT_OUT, kind, thing.place, thing.name, detail)
         else:
             kept.append((replace(thing, geometry=area), outline))
     if len(kept) > MOST_STRUCTURES:
@@ -376,7 +376,7 @@ def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> 
         for index, each in enumerate(buildings):
             if getattr(each, key).casefold() == asked:
                 return index
-    for lost in site.ledger.of(Deed.LEFT_OUT):
+    for lost in site.ledger.of(Fate.LEFT_OUT):
         if lost.name.casefold() == asked:
             raise BlastEnvError(
                 f"--protect is {name!r}, which is left out: {lost.place}: {lost.kind}"
@@ -392,7 +392,7 @@ def _nearest(
     point = shapely.Point(x_m, y_m)
     distances_m = [each.outline.distance(point) for each in buildings]
     best, known = int(np.argmin(distances_m)), {each.place for each in buildings}
-    reasons = {each.place: each.kind for each in site.ledger.of(Deed.LEFT_OUT)}
+    reasons = {each.place: each.kind for each in site.ledger.of(Fate.LEFT_OUT)}
     reasons = {key: reason for key, reason in reasons.items() if key not in known}
     for each in (*site.of_role(Role.BUILDING), *site.faulty):
         if each.place not in reasons or each.role is not Role.BUILDING or each.geometry.is_empty:

@@ -17,7 +17,7 @@ from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, fewest_runs
 from blast_env.io.importing.fitting import FittedBuilding
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.outlines import check_outlines, mended
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
@@ -91,11 +91,11 @@ def charge_sources(
     for each in site.of_role(Role.CHARGE):
         if each.place not in used:
             on_site = shapely.intersects(each.geometry, site.box)
-            deed, kind = (Deed.LEFT_OUT, _BUILT_OVER) if on_site else (Deed.PASSED, OUTSIDE)
-            site.ledger.add(deed, kind, each.place, each.name)
+            fate, kind = (Fate.LEFT_OUT, _BUILT_OVER) if on_site else (Fate.PASSED, OUTSIDE)
+            site.ledger.add(fate, kind, each.place, each.name)
         elif each.width_m is not None and not has_kerbs:
             kind = "streets of too many bends, with charges on the centre line instead of the kerbs"
-            site.ledger.add(Deed.GUESSED, kind, each.place, each.name)
+            site.ledger.add(Fate.GUESSED, kind, each.place, each.name)
     return [*asked, *(source for _, source in sources)], used
 
 

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
     MapFeature,
@@ -87,9 +87,9 @@ def read_ifc(site_map: SiteMap) -> None:
             site_map.add(found)
             for each in own:
                 detail = f"of {found.place}"
-                ledger.add(Deed.MERGED, "parts of a building", _place(each.element), detail=detail)
+                ledger.add(Fate.MERGED, "parts of a building", _place(each.element), detail=detail)
             if "facade:width" in found.tags:
-                ledger.add(Deed.GUESSED, _GLASS, found.place, detail="annealed 6 mm")
+                ledger.add(Fate.GUESSED, _GLASS, found.place, detail="annealed 6 mm")
     for each in products:
         if each.id() not in solids:
             tags: dict[str, str | float | bool] = {each.is_a(): True, "building": "part"}

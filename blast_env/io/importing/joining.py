@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from shapely.geometry import LineString, Polygon
 
 from blast_env.arrays import FloatArray
-from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
@@ -61,7 +61,7 @@ def _ring(thing: Thing, ledger: Ledger) -> Polygon | None:
         return None
     if gap_m > _ROUNDING_M:
         kind, detail = "outlines with a gap", f"{1000.0 * gap_m:.1f} mm"
-        ledger.add(Deed.CLOSED, kind, thing.place, thing.name, detail)
+        ledger.add(Fate.CLOSED, kind, thing.place, thing.name, detail)
     return ring
 
 
@@ -93,7 +93,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     for k, outline in used.items():
         words = f", {1000.0 * bridged_m[k]:.1f} mm bridged" if bridged_m[k] > _ROUNDING_M else ""
         detail = f"outline of {found[outline].place}{words}"
-        ledger.add(Deed.CLOSED, JOINED, lines[k].place, lines[k].name, detail)
+        ledger.add(Fate.CLOSED, JOINED, lines[k].place, lines[k].name, detail)
     left = [replace(each, fault=OPEN) for k, each in enumerate(lines) if k not in used]
     return [*found, *left]
 
@@ -149,7 +149,7 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         if outlines[low] not in gone:
             found[outline] = replace(found[outline], geometry=filling.geometry)
             kind, detail = "fillings of outlines", f"of {found[outline].place}"
-            ledger.add(Deed.MERGED, kind, filling.place, filling.name, detail)
+            ledger.add(Fate.MERGED, kind, filling.place, filling.name, detail)
             gone.add(outlines[low])
     for low, around in sorted(deep.items(), key=lambda each: len(each[1])):
         court = things[outlines[low]]
@@ -161,7 +161,7 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         hole = shapely.difference(found[high].geometry, court.geometry)
         found[high] = replace(found[high], geometry=hole)
         kind, detail = "outlines within outlines, taken as courtyards", found[high].place
-        ledger.add(Deed.GUESSED, kind, court.place, court.name, f"of {detail}")
-        ledger.add(Deed.MERGED, "courtyards", court.place, court.name, f"with {detail}")
+        ledger.add(Fate.GUESSED, kind, court.place, court.name, f"of {detail}")
+        ledger.add(Fate.MERGED, "courtyards", court.place, court.name, f"with {detail}")
         gone.add(outlines[low])
     return [each for k, each in enumerate(found) if k not in gone]

@@ -17,7 +17,7 @@ _MOST_CUT_LINES: Final = 12
 _MOST_NAMED: Final = 50
 
 
-class Deed(StrEnum):
+class Fate(StrEnum):
     """The fate of an object in an import."""
 
     READ = "read"
@@ -28,14 +28,14 @@ class Deed(StrEnum):
     PASSED = "not of the site"
 
 
-CHANGES: Final = (Deed.MERGED, Deed.CLOSED, Deed.GUESSED, Deed.LEFT_OUT)
-"""The deeds that change the site, which are notes of an import."""
+CHANGES: Final = (Fate.MERGED, Fate.CLOSED, Fate.GUESSED, Fate.LEFT_OUT)
+"""The fates that change the site, which are notes of an import."""
 
-STRICT: Final = (Deed.GUESSED, Deed.LEFT_OUT)
-"""The deeds that `--strict` refuses."""
+STRICT: Final = (Fate.GUESSED, Fate.LEFT_OUT)
+"""The fates that `--strict` refuses."""
 
-FATES: Final = (Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
-"""The deeds that say where an object is; a guess is in addition to them."""
+FATES: Final = (Fate.MERGED, Fate.CLOSED, Fate.LEFT_OUT, Fate.PASSED)
+"""The fates that say where an object is; a guess is in addition to them."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class LedgerEntry:
     """A line of the ledger.
 
     Attributes:
-        deed: What was done.
+        fate: What was done.
         kind: The kind of the object, or the reason.
         place: The object's place in the file: `way 4711`.
         name: Its name in the file.
@@ -51,7 +51,7 @@ class LedgerEntry:
         position: A place in it, in the coordinates of the file.
     """
 
-    deed: Deed
+    fate: Fate
     kind: str
     place: str
     name: str = ""
@@ -67,23 +67,23 @@ class LedgerEntry:
 
 @dataclass
 class Ledger:
-    """The entries of an import; see `Deed`.
+    """The entries of an import; see `Fate`.
 
     Every object of a file that is not used has an entry that says why.
 
     Attributes:
-        entries: All entries, in the order of the deeds done.
+        entries: All entries, in the order of the fates done.
     """
 
     entries: list[LedgerEntry] = field(default_factory=list)
 
-    def add(self, deed: Deed, kind: str, place: str, name: str = "", detail: str = "") -> None:
+    def add(self, fate: Fate, kind: str, place: str, name: str = "", detail: str = "") -> None:
         """Add an entry."""
-        self.entries.append(LedgerEntry(deed, kind, place, name, detail))
+        self.entries.append(LedgerEntry(fate, kind, place, name, detail))
 
-    def of(self, *deeds: Deed) -> tuple[LedgerEntry, ...]:
-        """Return the entries of some deeds."""
-        return tuple(each for each in self.entries if each.deed in deeds)
+    def of(self, *fates: Fate) -> tuple[LedgerEntry, ...]:
+        """Return the entries of some fates."""
+        return tuple(each for each in self.entries if each.fate in fates)
 
     def save(self, path: Path) -> Path:
         """Write all entries as JSON, or as text for other suffixes; return the path.
@@ -92,21 +92,21 @@ class Ledger:
             BlastEnvError: If the file cannot be written.
         """
         is_json = path.suffix.lower() == ".json"
-        lines = "".join(f"{line}\n" for line in self.lines(tuple(Deed)))
+        lines = "".join(f"{line}\n" for line in self.lines(tuple(Fate)))
         text = json.dumps(self.record, indent=1) if is_json else lines
         with write_atomically(path) as target:
             target.write_text(text, encoding="utf-8")
         return path
 
-    def lines(self, deeds: Sequence[Deed], most: int | None = None) -> tuple[str, ...]:
-        """Return a line for each kind of entries, by deed.
+    def lines(self, fates: Sequence[Fate], most: int | None = None) -> tuple[str, ...]:
+        """Return a line for each kind of entries, by fate.
 
         Args:
-            deeds: The deeds, in their order.
+            fates: The fates, in their order.
             most: Most letters of a line, which names as many objects as it has room for.
         """
         found = []
-        for kind, entries in self._grouped(deeds).items():
+        for kind, entries in self._grouped(fates).items():
             count = len(entries) if most is None else min(len(entries), _MOST_NAMED)
             line = _line(kind, entries, count)
             while most is not None and len(line) > most and count:
@@ -117,10 +117,10 @@ class Ledger:
 
     @property
     def record(self) -> dict[str, Any]:
-        """The entries for JSON, by deed and kind."""
-        record: dict[str, dict[str, list[dict[str, Any]]]] = {str(deed): {} for deed in Deed}
-        for (deed, kind), entries in self._grouped(tuple(Deed)).items():
-            record[deed][kind] = [
+        """The entries for JSON, by fate and kind."""
+        record: dict[str, dict[str, list[dict[str, Any]]]] = {str(fate): {} for fate in Fate}
+        for (fate, kind), entries in self._grouped(tuple(Fate)).items():
+            record[fate][kind] = [
                 {
                     key: value
                     for key in ("place", "name", "detail", "position")
@@ -146,15 +146,15 @@ class Ledger:
                 f"{path}: --strict allows no guess and no omission, but there are:{listed}{more}"
             )
 
-    def _grouped(self, deeds: Sequence[Deed]) -> dict[tuple[Deed, str], list[LedgerEntry]]:
-        groups: dict[tuple[Deed, str], list[LedgerEntry]] = {}
-        for deed in deeds:
-            for each in self.of(deed):
-                groups.setdefault((deed, each.kind), []).append(each)
+    def _grouped(self, fates: Sequence[Fate]) -> dict[tuple[Fate, str], list[LedgerEntry]]:
+        groups: dict[tuple[Fate, str], list[LedgerEntry]] = {}
+        for fate in fates:
+            for each in self.of(fate):
+                groups.setdefault((fate, each.kind), []).append(each)
         return groups
 
 
-def _line(kind: tuple[Deed, str], entries: Sequence[LedgerEntry], count: int) -> str:
+def _line(kind: tuple[Fate, str], entries: Sequence[LedgerEntry], count: int) -> str:
     """Return a line on the entries of a kind with the first of its objects."""
     shown = [each.words for each in entries[:count]]
     more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []

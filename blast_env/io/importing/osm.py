@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
     MOST_POINTS,
     WGS84,
@@ -208,7 +208,7 @@ class _Extract:
                 fault = OPEN
             else:
                 if not area.is_valid or not isclose(area.length, geometry.length):
-                    self.site_map.ledger.add(Deed.GUESSED, TOUCHING, place)
+                    self.site_map.ledger.add(Fate.GUESSED, TOUCHING, place)
                 # Holes that touch the border or each other are not valid, and become notches.
                 geometry = shapely.normalize(area if area.is_valid else area.buffer(0.0))
         self.site_map.add(MapFeature(geometry, tags, place, fault))

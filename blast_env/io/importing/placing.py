@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing.joining import closed, with_courtyards
-from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.options import (
     MARGIN_M,
     MOST_MARGIN_M,
@@ -142,10 +142,10 @@ def _faults(faulty: Iterable[Thing], site: PlacedSite) -> Iterator[Thing]:
     is_whole_file = site.options.size_m is None
     for each in faulty:
         if is_whole_file or each.geometry.is_empty or shapely.intersects(each.geometry, site.box):
-            site.ledger.add(Deed.LEFT_OUT, each.fault, each.place, each.name)
+            site.ledger.add(Fate.LEFT_OUT, each.fault, each.place, each.name)
             yield each
         else:
-            site.ledger.add(Deed.PASSED, OUTSIDE, each.place, each.name)
+            site.ledger.add(Fate.PASSED, OUTSIDE, each.place, each.name)
 
 
 def _nothing(site_map: SiteMap, faulty: Sequence[Thing]) -> BlastEnvError:
@@ -203,7 +203,7 @@ def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thin
     is_near = shapely.intersects(geometries, around)
     for index in np.flatnonzero(~is_near):
         far = measured[int(index)]
-        site_map.ledger.add(Deed.PASSED, OUTSIDE, far.place, far.name)
+        site_map.ledger.add(Fate.PASSED, OUTSIDE, far.place, far.name)
     if not is_near.any():
         x, y = reference
         left, bottom, right, top = shapely.total_bounds([each.geometry for each in things])
@@ -306,5 +306,5 @@ def _margin_m(site_map: SiteMap, things: Sequence[Thing], bounds_m: FloatArray) 
         nearest = streets[lengths_m.argmax()]
         margin_m += np.ceil(nearest.width_m or 0.0)
         detail = f"--margin {margin_m:g} for {MARGIN_M:g}"
-        site_map.ledger.add(Deed.GUESSED, _WIDER, nearest.place, nearest.name, detail)
+        site_map.ledger.add(Fate.GUESSED, _WIDER, nearest.place, nearest.name, detail)
     return float(margin_m)

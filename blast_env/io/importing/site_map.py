@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.io.importing.ledger import FATES, Deed, Ledger
+from blast_env.io.importing.ledger import FATES, Fate, Ledger
 from blast_env.io.importing.options import ImportOptions
 
 MOST_BYTES: Final = 50_000_000
@@ -109,14 +109,14 @@ class SiteMap:
         fates = {each.place for each in self.ledger.of(*FATES)}
         for each in self.features:
             if each.place in used:
-                self.ledger.add(Deed.READ, used[each.place], each.place)
+                self.ledger.add(Fate.READ, used[each.place], each.place)
             elif each.place not in fates:
-                self.ledger.add(Deed.LEFT_OUT, _UNUSED, each.place)
-        elsewhere = {each.place for each in self.ledger.of(Deed.PASSED)}
+                self.ledger.add(Fate.LEFT_OUT, _UNUSED, each.place)
+        elsewhere = {each.place for each in self.ledger.of(Fate.PASSED)}
         self.ledger.entries = [
             replace(each, position=positions.get(each.place))
             for each in self.ledger.entries
-            if each.deed is not Deed.GUESSED or each.place not in elsewhere
+            if each.fate is not Fate.GUESSED or each.place not in elsewhere
         ]
 
     def check_coordinates(self) -> None:

@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import MAX_TEXT, BlastEnvError, value_text
-from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 from blast_env.values import typed_number
 
@@ -215,7 +215,7 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
         else:
             chief = next((key for key in (*_CHIEF_KEYS, *feature.tags) if key in feature.tags), "")
             kind = f"layer {feature.tags['layer']}" if site_map.has_layers else chief or "no tag"
-            site_map.ledger.add(Deed.PASSED, f"without a role: {kind}", feature.place)
+            site_map.ledger.add(Fate.PASSED, f"without a role: {kind}", feature.place)
     return tuple(found)
 
 
@@ -347,7 +347,7 @@ def _width_m(feature: MapFeature, ledger: Ledger) -> float | None:
     lanes = length_m(feature.tags.get("lanes", ""))
     width_m = _LANE_M * (lanes or (1 if road in _NARROW else 2))
     if lanes is None:
-        ledger.add(Deed.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {road}")
+        ledger.add(Fate.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {road}")
     return width_m
 
 
@@ -386,13 +386,13 @@ def _first_m(
             numbers = [length_m(each) for each in re.split(r"[;/-]", value[:MAX_TEXT])]
             number = max((each for each in numbers if each), default=None)
             detail = f"{key} is {value_text(value)}, the largest counts"
-            ledger.add(Deed.GUESSED, "heights of several numbers", feature.place, detail=detail)
+            ledger.add(Fate.GUESSED, "heights of several numbers", feature.place, detail=detail)
         if number is not None:
             return number * unit_m
         is_base = key in (*_BASE_KEYS, *_BASE_LEVEL_KEYS)
         if not is_base or str(value) not in ("0", "0.0", "0 m"):
             detail = f"{key} is {value_text(value)}, which is no length in m or ft"
-            ledger.add(Deed.GUESSED, "heights that cannot be read", feature.place, detail=detail)
+            ledger.add(Fate.GUESSED, "heights that cannot be read", feature.place, detail=detail)
     return None
 
 

@@ -11,7 +11,7 @@ from ezdxf import units
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, import_site, osm, site_map
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from tests.io.importing.maps import BLOCK, LAYERS, Places, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))
@@ -191,9 +191,9 @@ def test_a_building_that_modules_cannot_show_is_named(tmp_path: Path) -> None:
     thin = outline(rectangle(10, 0, 20, 0.4), name="wall")
     house = HOUSE | {"geometry": outline(rectangle(20, 8, 6, 4))["geometry"]}
     site = import_site(written(tmp_path, tower, house, thin, PLACE), ImportOptions())
-    off = [each.name for each in site.ledger.of(Deed.GUESSED) if "modules miss" in each.kind]
+    off = [each.name for each in site.ledger.of(Fate.GUESSED) if "modules miss" in each.kind]
     assert "building_1" in off
-    assert "wall" in (*off, *(each.name for each in site.ledger.of(Deed.LEFT_OUT)))
+    assert "wall" in (*off, *(each.name for each in site.ledger.of(Fate.LEFT_OUT)))
 
 
 def test_a_site_of_too_many_buildings(tmp_path: Path) -> None:
@@ -262,7 +262,7 @@ def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
     path = tmp_path / "cut.osm"
     path.write_text(text.replace(f"{line}\n", ""))
     site = import_site(path, HALL)
-    (cut,) = (each for each in site.ledger.of(Deed.LEFT_OUT) if each.kind == osm.CUT)
+    (cut,) = (each for each in site.ledger.of(Fate.LEFT_OUT) if each.kind == osm.CUT)
     assert (cut.place, cut.name) == ("way 2", "Baker")
     assert "Baker" not in [each.name for each in site.buildings]
     assert "--protect is 'baker', which is left out: way 2" in error_of(

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 
@@ -104,16 +104,16 @@ def test_storeys_and_windows_of_a_model_are_its_facade(tmp_path: Path) -> None:
     (window,) = site.scenario.components.values()
     assert window.kind == "glazing"
     assert (window.width_m, window.height_m, window.sill_m) == (1.2, 1.4, 0.9)
-    (glass,) = site.ledger.of(Deed.GUESSED)
+    (glass,) = site.ledger.of(Fate.GUESSED)
     assert glass.kind == "glass, which IFC does not state"
-    assert len(site.ledger.of(Deed.MERGED)) == 2 * (1 + 4 + 6)
+    assert len(site.ledger.of(Fate.MERGED)) == 2 * (1 + 4 + 6)
 
 
 def test_everything_left_out_of_a_model_is_named_by_its_id(tmp_path: Path) -> None:
     model = house()
     column = model.box("IfcColumn", 0, (2000.0, -3000.0, 0.0), (400.0, 400.0, 3000.0))
     chair = model.box("IfcFurniture", 0, (3000.0, 3000.0, 0.0), (500.0, 500.0, 900.0))
-    left_out = model.imported(tmp_path).ledger.of(Deed.LEFT_OUT)
+    left_out = model.imported(tmp_path).ledger.of(Fate.LEFT_OUT)
     assert {each.place for each in left_out} == {f"IfcColumn {column}", f"IfcFurniture {chair}"}
 
 

@@ -13,7 +13,7 @@ from pyproj import Transformer
 
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Deed
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.things import Role
 from blast_env.layout import usable_cells
 from blast_env.site import AnySource, RectangleSource, Scenario, load_scenario, save_scenario
@@ -80,7 +80,7 @@ def test_heights_are_those_of_the_map_in_whole_modules(block: ImportedSite) -> N
         "Water Tower": 18.0,
         "Chapel": 9.0,  # the median of its neighbours
     }
-    (guess,) = (each for each in block.ledger.of(Deed.GUESSED) if "heights" in each.kind)
+    (guess,) = (each for each in block.ledger.of(Fate.GUESSED) if "heights" in each.kind)
     assert (guess.place, guess.name) == ("features[6]", "Chapel")
     assert guess.detail.startswith("9.0 m as 7 neighbours, low ")
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
 from blast_env.io.importing.convert import read_map
-from blast_env.io.importing.ledger import Deed, Ledger, LedgerEntry
+from blast_env.io.importing.ledger import Fate, Ledger, LedgerEntry
 from blast_env.plots.plan import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
@@ -30,8 +30,8 @@ DEGREE_M = 111_195.0
 """Length of a degree on the equator, where the extracts of these tests lie."""
 
 
-def entries(site: ImportedSite, deed: Deed, words: str) -> tuple[LedgerEntry, ...]:
-    return tuple(each for each in site.ledger.of(deed) if words in each.kind)
+def entries(site: ImportedSite, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
+    return tuple(each for each in site.ledger.of(fate) if words in each.kind)
 
 
 def places(found: Sequence[LedgerEntry]) -> list[str]:
@@ -117,7 +117,7 @@ def test_relation_without_all_ways_is_left_out_by_name(missing: str, tmp_path: P
     extract.relation(5, members, building="yes", name="Court")
     path = extract.write(tmp_path)
     site = imported(path, **HOUSE_1)
-    (lost,) = entries(site, Deed.LEFT_OUT, "relations of which the extract does not have all ways")
+    (lost,) = entries(site, Fate.LEFT_OUT, "relations of which the extract does not have all ways")
     assert (lost.place, lost.name) == ("relation 5", "Court")
     assert any("(relation 5 'Court')" in each for each in site.scenario.import_notes)
     assert "--protect is 'Court', which is left out: relation 5" in error_of(
@@ -143,7 +143,7 @@ def test_relation_whose_rings_share_a_side_is_put_together(tmp_path: Path) -> No
     right = shapely.affinity.translate(right, *house.outline.bounds[:2])
     assert shapely.hausdorff_distance(court.outline, right) < 0.1
     assert shapely.get_num_coordinates(court.outline) == 9
-    assert places(entries(site, Deed.GUESSED, "rings that touch")) == ["relation 5"]
+    assert places(entries(site, Fate.GUESSED, "rings that touch")) == ["relation 5"]
 
 
 def test_relation_of_many_rings_is_an_area_with_holes_and_islands(tmp_path: Path) -> None:
@@ -199,8 +199,8 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
         "way 4": 6.0,
     }
     assert [area for _, area in found.values()] == pytest.approx([100.0, 100.0], rel=0.01)
-    assert places(entries(site, Deed.MERGED, "small or without a height")) == ["way 5"]
-    assert places(entries(site, Deed.MERGED, "parts above their building, covered")) == ["way 1"]
+    assert places(entries(site, Fate.MERGED, "small or without a height")) == ["way 5"]
+    assert places(entries(site, Fate.MERGED, "parts above their building, covered")) == ["way 1"]
     assert all(each.protected for each in site.buildings)
     assert len({each.building for each in site.scenario.structures}) == 1
     weights = sum(each.weight for each in site.scenario.structures if each.protected)
@@ -224,7 +224,7 @@ def test_heights_as_people_write_them(
     house = outline(rectangle(0, 0, 6, 4), protected=True, **tags)
     site = imported(written(tmp_path, house, PLACE))
     assert site.buildings[0].height_m == height_m
-    guesses = site.ledger.of(Deed.GUESSED)
+    guesses = site.ledger.of(Fate.GUESSED)
     assert [words in each.kind for each in guesses if words] == ([True] if words else [])
     assert words is not None or not guesses
 
@@ -238,10 +238,10 @@ def test_roofs_are_open_below_and_cellars_are_left_out(tmp_path: Path) -> None:
     site = imported(extract.write(tmp_path), **HOUSE_1)
     (roof,) = (each for each in site.buildings if each.place == "way 3")
     assert (roof.base_m, roof.height_m) == (4.0, 4.5)
-    assert places(entries(site, Deed.GUESSED, "open below")) == ["way 3"]
-    assert places(entries(site, Deed.LEFT_OUT, "below the ground")) == ["way 4"]
-    assert places(entries(site, Deed.LEFT_OUT, "not on the ground")) == ["way 5"]
-    assert "way 6" in places(entries(site, Deed.READ, "place of a charge"))
+    assert places(entries(site, Fate.GUESSED, "open below")) == ["way 3"]
+    assert places(entries(site, Fate.LEFT_OUT, "below the ground")) == ["way 4"]
+    assert places(entries(site, Fate.LEFT_OUT, "not on the ground")) == ["way 5"]
+    assert "way 6" in places(entries(site, Fate.READ, "place of a charge"))
 
 
 def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) -> None:
@@ -255,8 +255,8 @@ def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) 
         "features[1]": (3.0, 84.0),
         "features[2]": (12.0, 16.0),
     }
-    assert places(entries(site, Deed.MERGED, "covered")) == ["features[3]"]
-    assert places(entries(site, Deed.MERGED, "overlap left out")) == ["features[1]"]
+    assert places(entries(site, Fate.MERGED, "covered")) == ["features[3]"]
+    assert places(entries(site, Fate.MERGED, "overlap left out")) == ["features[1]"]
 
 
 def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
@@ -264,8 +264,8 @@ def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
     thin = outline(rectangle(10, 0, 0.2, 30), name="Screen")
     site = imported(written(tmp_path, HOUSE, ruin, thin, PLACE))
     assert [each.place for each in site.buildings] == ["features[0]"]
-    assert places(entries(site, Deed.MERGED, "covered")) == ["features[1]"]
-    assert places(entries(site, Deed.LEFT_OUT, "centre of no module")) == ["features[2]"]
+    assert places(entries(site, Fate.MERGED, "covered")) == ["features[1]"]
+    assert places(entries(site, Fate.LEFT_OUT, "centre of no module")) == ["features[2]"]
 
 
 def test_exchanged_longitude_and_latitude_are_refused(tmp_path: Path) -> None:
@@ -299,7 +299,7 @@ def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: P
     assert (heights["Bare"], heights["Shed"], heights["Garages"]) == (8.0, 3.0, 3.0)
     low = imported(path, low_heights=True)
     assert {each.title: each.height_m for each in low.buildings}["Bare"] == 6.0
-    (guess,) = (each for each in imported(path).ledger.of(Deed.GUESSED) if each.name == "Bare")
+    (guess,) = (each for each in imported(path).ledger.of(Fate.GUESSED) if each.name == "Bare")
     assert "unsafe side" in guess.kind
     assert guess.detail == "8.0 m as 5 neighbours, low 6.0 m"
     same = imported(path, default_height_m=5.0)
@@ -329,7 +329,7 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
     near = kerbs_m(site)
     south = house.outline.bounds[1]
     assert sorted(south - y for y in near) == pytest.approx([9.0, 15.0], abs=0.15)
-    assert not entries(site, Deed.GUESSED, "widths of streets")
+    assert not entries(site, Fate.GUESSED, "widths of streets")
     assert not any("lies over" in note for note in site.notes)
     wide = imported(extract.write(tmp_path), zone_around_m=10.0, margin_m=20.0, **HOUSE_1)
     assert any("lies over 1 parts of streets" in note for note in wide.notes)
@@ -342,7 +342,7 @@ def test_widths_of_streets_are_those_of_their_lanes_or_guessed(tmp_path: Path) -
         ends = [extract.node(x, y) for x in (-20.0, 30.0)]
         extract.way_of(int(place[-1]), ends, highway="residential", **more)
     site = imported(extract.write(tmp_path), rotation_deg=0.0, margin_m=60.0, **HOUSE_1)
-    (guess,) = entries(site, Deed.GUESSED, "widths of streets")
+    (guess,) = entries(site, Fate.GUESSED, "widths of streets")
     assert (guess.place, guess.detail) == ("way 4", "6 m as residential")
     south = site.buildings[0].outline.bounds[1]
     near = sorted(south - y for y in kerbs_m(site))
@@ -353,14 +353,14 @@ def test_a_no_build_area_without_an_outline_is_named(tmp_path: Path) -> None:
     tree = charge(3.0, 9.0) | {"properties": {"kind": "keep_out", "name": "tree"}}
     site = imported(written(tmp_path, HOUSE, tree, PLACE), zone_around_m=8.0)
     assert not site.scenario.zone.keep_outs
-    assert places(entries(site, Deed.LEFT_OUT, "without an outline")) == ["features[1]"]
+    assert places(entries(site, Fate.LEFT_OUT, "without an outline")) == ["features[1]"]
 
 
 def test_a_lane_too_near_to_a_building_is_named(tmp_path: Path) -> None:
     lane = street(-0.1, width="2")
     lane["geometry"]["coordinates"] = [[1, -0.1], [5, -0.1]]
     site = imported(written(tmp_path, HOUSE, lane, PLACE))
-    assert places(entries(site, Deed.LEFT_OUT, "too near to a building")) == ["features[1]"]
+    assert places(entries(site, Fate.LEFT_OUT, "too near to a building")) == ["features[1]"]
 
 
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
@@ -376,7 +376,7 @@ def street(y: float, **tags: str) -> dict[str, Any]:
 def test_ground_reaches_to_the_nearest_street_as_a_guess(tmp_path: Path) -> None:
     path = written(tmp_path, HOUSE, street(-33.0), street(-60.0))
     site = imported(path, rotation_deg=0.0)
-    (guess,) = entries(site, Deed.GUESSED, "ground around buildings")
+    (guess,) = entries(site, Fate.GUESSED, "ground around buildings")
     assert (guess.place, guess.name) == ("features[1]", "Long Lane")
     assert guess.detail == "--margin 39 for 10"
     assert site.site.size_m == (6.0 + 78.0, 4.0 + 78.0)
@@ -390,7 +390,7 @@ def test_ground_reaches_to_the_nearest_street_as_a_guess(tmp_path: Path) -> None
 def test_ground_stays_if_it_has_a_place_for_a_charge(tmp_path: Path) -> None:
     for features in ([street(-9.0), street(-33.0)], [street(-33.0), PLACE]):
         site = imported(written(tmp_path, HOUSE, *features), rotation_deg=0.0)
-        assert not entries(site, Deed.GUESSED, "ground around buildings")
+        assert not entries(site, Fate.GUESSED, "ground around buildings")
     path = written(tmp_path, HOUSE, street(-33.0))
     assert imported(path, charge_at=((-5.0, 2.0),)).site.shape == (48, 52)
 
@@ -458,7 +458,7 @@ def test_entities_on_layer_0_of_a_block_have_the_layer_of_the_insert(tmp_path: P
     document.saveas(path)
     site = imported(path, **DRAWN)
     assert [each.outline.area for each in site.buildings] == [24.0]
-    assert len(entries(site, Deed.PASSED, "layer TREES")) == 1
+    assert len(entries(site, Fate.PASSED, "layer TREES")) == 1
 
 
 @pytest.mark.parametrize("stretch", [1.0, 2.0])
@@ -483,7 +483,7 @@ def test_blocks_in_stretched_and_turned_blocks_keep_layers_and_shapes(
     skewed = shapely.affinity.scale(skewed, stretch, 1.0)
     lengths = [each.outline.length for each in site.buildings if len(each.polygons[0].walls) == 4]
     assert lengths == pytest.approx([skewed.length], rel=1e-3)
-    assert not entries(site, Deed.LEFT_OUT, "")
+    assert not entries(site, Fate.LEFT_OUT, "")
 
 
 @pytest.mark.parametrize("gap", [0.0006, 0.005, 0.2])
@@ -502,14 +502,14 @@ def test_outlines_with_a_gap_are_closed_and_named(gap: float, tmp_path: Path) ->
         others = {"protect_near": (21.0, 1.0), "charge_at": ((15.0, 2.0),)}
         site = imported(path, **(DRAWN | others))
         assert len(site.buildings) == 1
-        assert len(entries(site, Deed.LEFT_OUT, "open lines")) == 5
+        assert len(entries(site, Fate.LEFT_OUT, "open lines")) == 5
         assert "nearest to it is LWPOLYLINE" in error_of(path, **DRAWN)
         return
     site = imported(path, **DRAWN)
     assert len(site.buildings) == 3
-    (alone,) = entries(site, Deed.CLOSED, "outlines with a gap")
+    (alone,) = entries(site, Fate.CLOSED, "outlines with a gap")
     assert alone.detail == f"{1000 * gap:.1f} mm"
-    together = entries(site, Deed.CLOSED, "lines joined to outlines")
+    together = entries(site, Fate.CLOSED, "lines joined to outlines")
     assert len(together) == 4
     assert any(f"{1000 * gap:.1f} mm bridged" in each.detail for each in together)
 
@@ -534,7 +534,7 @@ def test_hatch_with_a_hole_and_an_inner_outline_are_courtyards(tmp_path: Path) -
     document.saveas(path)
     site = imported(path, **DRAWN)
     assert [each.outline.area for each in site.buildings] == [104.0, 104.0]
-    assert len(entries(site, Deed.GUESSED, "taken as courtyards")) == 1
+    assert len(entries(site, Fate.GUESSED, "taken as courtyards")) == 1
 
 
 @pytest.mark.parametrize("yard", [False, True])
@@ -586,7 +586,7 @@ def test_what_a_drawing_has_of_no_outline_is_named(tmp_path: Path) -> None:
     space.add_mline([(20, 0), (30, 0)], dxfattribs=of_layer("HOUSES"))
     document.saveas(path)
     site = imported(path, **DRAWN)
-    kinds = {each.kind for each in site.ledger.of(Deed.LEFT_OUT)}
+    kinds = {each.kind for each in site.ledger.of(Fate.LEFT_OUT)}
     assert {
         "references to other files, or to blocks that are not there",
         "entities of the type XLINE",
@@ -606,7 +606,7 @@ def test_scale_of_0_is_1(tmp_path: Path) -> None:
     )
     site = imported(path, **DRAWN)
     assert [each.outline.area for each in site.buildings] == [24.0]
-    assert len(entries(site, Deed.GUESSED, "scale of 0")) == 2
+    assert len(entries(site, Fate.GUESSED, "scale of 0")) == 2
 
 
 def test_damaged_drawing_is_recovered_and_named(tmp_path: Path) -> None:
@@ -619,7 +619,7 @@ def test_damaged_drawing_is_recovered_and_named(tmp_path: Path) -> None:
     path.write_text("\n".join([*lines[: at + 2], "NO HANDLE", *lines[at + 3 :]]))
     site = imported(path, **DRAWN)
     assert len(site.buildings) == 1
-    assert places(entries(site, Deed.GUESSED, "recovered")) == ["plan.dxf"]
+    assert places(entries(site, Fate.GUESSED, "recovered")) == ["plan.dxf"]
 
 
 @pytest.mark.parametrize("old", [True, False])
@@ -670,7 +670,7 @@ def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
         "Bare",
         (13.0, 2.0),
     )
-    assert "read: building: 2 (features[0], features[1])" in "".join(site.ledger.lines(tuple(Deed)))
+    assert "read: building: 2 (features[0], features[1])" in "".join(site.ledger.lines(tuple(Fate)))
     (note,) = site.scenario.import_notes
     assert note.startswith("guessed: heights not in the file")
 
@@ -678,8 +678,8 @@ def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
 def test_notes_in_a_scenario_name_as_many_objects_as_there_is_room() -> None:
     ledger = Ledger()
     for number in range(2000):
-        ledger.add(Deed.GUESSED, "heights", f"way {number}", "Name" * 9)
-    (note,) = ledger.lines((Deed.GUESSED,), 1000)
+        ledger.add(Fate.GUESSED, "heights", f"way {number}", "Name" * 9)
+    (note,) = ledger.lines((Fate.GUESSED,), 1000)
     assert note.startswith("guessed: heights: 2000 (way 0 'Name")
     assert 900 < len(note) <= 1000
     assert note.endswith(" more)")
@@ -731,11 +731,11 @@ def test_every_object_is_on_the_ledger_or_on_the_site(
     path = written(tmp_path_factory.mktemp("maps"), *features)
     part: dict[str, Any] = {"origin": (20.0, -5.0), "size_m": (50.0, 30.0)} if cut else {}
     site = imported(path, protect=("House",), **part)
-    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    fates = site.ledger.of(Fate.READ, Fate.MERGED, Fate.CLOSED, Fate.LEFT_OUT, Fate.PASSED)
     assert {each.place for each in fates} == {f"features[{k}]" for k in range(len(features))}
-    read = {each.place for each in site.ledger.of(Deed.READ) if each.kind == "building"}
+    read = {each.place for each in site.ledger.of(Fate.READ) if each.kind == "building"}
     assert read == {each.place for each in site.buildings}
-    assert not entries(site, Deed.LEFT_OUT, "of no use")
+    assert not entries(site, Fate.LEFT_OUT, "of no use")
 
 
 def test_a_folder_of_files_has_the_sums_of_their_ledgers(
@@ -786,7 +786,7 @@ def test_every_way_of_an_extract_is_on_the_ledger(
         else:
             extract.way(number, rectangle(x, y, side, side), **tags)
     site = imported(extract.write(tmp_path_factory.mktemp("maps")), **HOUSE_1)
-    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    fates = site.ledger.of(Fate.READ, Fate.MERGED, Fate.CLOSED, Fate.LEFT_OUT, Fate.PASSED)
     tagged = {f"way {number}" for number, (_, tags) in zip(numbers, drawn, strict=True) if tags}
     assert {each.place for each in fates} >= {"way 1", "way 2", *tagged}
 
@@ -826,6 +826,6 @@ def test_every_entity_of_a_drawing_is_on_the_ledger(
         handles.append(make[kind]().dxf.handle)
     document.saveas(path)
     site = imported(path, **DRAWN)
-    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    fates = site.ledger.of(Fate.READ, Fate.MERGED, Fate.CLOSED, Fate.LEFT_OUT, Fate.PASSED)
     named = {word for each in fates for word in each.place.split()}
     assert {*handles} <= named
