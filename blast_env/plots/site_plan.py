@@ -1,6 +1,7 @@
 """The plan of a site in matplotlib: features, loads, names, legends and headings."""
 
 from collections.abc import Iterable, Sequence
+from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
@@ -406,6 +407,7 @@ def _box(axes: Axes, feature: Feature, pixels_per_pt: float) -> Rectangle:
 
 _HEADING_SHARE: Final = 0.97  # of the width of a figure
 _LEFT_SHARE: Final = 0.0125
+_SUBTITLE_PT: Final = 10.0
 
 
 def write_heading(
@@ -421,6 +423,7 @@ def write_heading(
         left: Whether they begin at the left border rather than stand in the middle.
     """
     x, side = (_LEFT_SHARE, "left") if left else (0.5, "center")
+    subtitle = _wrapped(figure, subtitle, share)
     # The empty lines reserve room for the subtitle, which the layout ignores.
     room = "\n" * len(subtitle.split("\n"))
     heading = figure.suptitle(
@@ -432,11 +435,25 @@ def write_heading(
         xycoords=heading,
         ha=side,
         va="bottom",
-        fontsize=10,
+        fontsize=_SUBTITLE_PT,
         color=unit_interval(QUIET_INK),
         annotation_clip=False,
     )
     line.set_in_layout(False)
-    for text, size_pt in ((heading, 14), (line, 10)):
-        wide = text.get_window_extent().width / (share * figure.bbox.width)
-        text.set_fontsize(size_pt / max(wide, 1.0))
+    for text, size_pt in ((heading, 14.0), (line, _SUBTITLE_PT)):
+        text.set_fontsize(size_pt / max(_share_of_width(figure, text) / share, 1.0))
+
+
+def _wrapped(figure: Figure, subtitle: str, share: float) -> str:
+    """Return a subtitle in lines that fit a share of the width, broken between words."""
+    drawn = figure.text(0.0, 0.0, subtitle, fontsize=_SUBTITLE_PT)
+    wide = max(_share_of_width(figure, drawn) / share, 1.0)
+    drawn.remove()
+    lines = subtitle.split("\n")
+    most = int(max(map(len, lines)) / wide)
+    parts = (wrap(each, most, break_long_words=False, break_on_hyphens=False) for each in lines)
+    return "\n".join(part for of_line in parts for part in of_line or [""])
+
+
+def _share_of_width(figure: Figure, text: Text) -> float:
+    return float(text.get_window_extent().width / figure.bbox.width)
