@@ -161,8 +161,9 @@ def picture(
         for each in methods:
             runs = [run for run in each.runs if run.budget == budget]
             curves[each.method] = mean_curve(runs, ends, blasts)
-        for name in sorted(curves, key=lambda each: -curves[each][-1]):
-            axes.step(blasts, curves[name], where="post", label=name)
+        for index, name in enumerate(sorted(curves, key=lambda each: -curves[each][-1])):
+            line = "-" if index < 10 else "--"  # the colours repeat after ten
+            axes.step(blasts, curves[name], where="post", label=name, linestyle=line)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
