@@ -22,7 +22,7 @@ from blast_env.geometry import Rectangle
 from blast_env.plots.canvas import Frame, Sheet
 from blast_env.plots.gas import (
     MINUS,
-    gas_subtitle,
+    gas_heading,
 )
 from blast_env.plots.plan import (
     BARRIER,
@@ -65,6 +65,7 @@ _FINER: Final = 4  # pixels along a cell
 _COLOURS: Final = "RdBu_r"  # darker to both sides; red and blue suit any colour vision
 _LINEAR_SHARE: Final = 0.1  # of the scale
 _TICKS: Final = (1.0, 0.5, 0.2, 0.05)
+_BARRIER: Final = "barrier; an outline where it is lower than the plan"
 _CUT_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
     {"color": unit_interval(INK), "linewidth": 0.8, "linestyle": (0, (6, 3, 1, 3))}
 )
@@ -236,7 +237,6 @@ class PressurePainter:
         low, high = site.site_m[along], site.site_m[along + 2]
         self._section_m = Rectangle(low, 0.0, high, site.air_height_m)
         self._images: list[_Picture] = []
-        blasts = [shot.result.blast for shot in shots]
         scale = max(width_px / (_USUAL_WIDTH_PX * len(shots)), 1.0)
         self.sheet = Sheet(width_px, scale, len(shots), (self._site_m, self._section_m))
         for number in range(len(shots)):
@@ -244,10 +244,8 @@ class PressurePainter:
             self._draw_section(number)
         self._draw_bar()
         write_legend(self.sheet.figure, self._handles())
-        barrier = "" if len(shots) > 1 else f", {barrier_text(blasts[0].layout)}"
-        title = f"{blasts[-1].scenario.name}: overpressure{barrier}"
-        share = _SHARE_OF_TITLES
-        write_heading(self.sheet.figure, title, gas_subtitle(blasts), share, left=True)
+        title, subtitle = gas_heading([shot.result for shot in shots], "overpressure")
+        write_heading(self.sheet.figure, title, subtitle, _SHARE_OF_TITLES, left=True)
         self.sheet.finish()
 
     @property
@@ -415,7 +413,7 @@ def _solids(site: BlastSite) -> list[Feature]:
         else:
             kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT
         feature = area_feature(kind, outline.rectangle_m, outline.name)
-        found.append(replace(feature, fill=fill, words="barrier" if fill is BARRIER else ""))
+        found.append(replace(feature, fill=fill, words=_BARRIER if fill is BARRIER else ""))
     return found
 
 
