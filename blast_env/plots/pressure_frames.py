@@ -65,7 +65,6 @@ _FINER: Final = 4  # pixels along a cell
 _COLOURS: Final = "RdBu_r"  # darker to both sides; red and blue suit any colour vision
 _LINEAR_SHARE: Final = 0.1  # of the scale
 _TICKS: Final = (1.0, 0.5, 0.2, 0.05)
-_BARRIER: Final = "barrier; an outline where it is lower than the plan"
 _CUT_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
     {"color": unit_interval(INK), "linewidth": 0.8, "linestyle": (0, (6, 3, 1, 3))}
 )
@@ -375,9 +374,7 @@ class PressurePainter:
 
     def _handles(self) -> list[Artist]:
         features = [
-            feature
-            for shot in self.shots
-            for feature in (*_on_ground(shot), *_solids(shot.result.run.site))
+            feature for shot in self.shots for feature in (*_on_ground(shot), *_solids(shot))
         ]
         return [*legend_of(features), Line2D([], [], **_CUT_STYLE, label="cut of the other view")]
 
@@ -404,16 +401,19 @@ def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
     return sorted(found, key=lambda each: each[1][0].base_m)
 
 
-def _solids(site: BlastSite) -> list[Feature]:
+def _solids(shot: PressureShot) -> list[Feature]:
     """Return the solids as features, in their colours in a cut."""
-    found = []
+    site, found = shot.result.run.site, []
     for outline in site.structures:
+        words = ""
         if outline.is_barrier:
             kind, fill = Kinds.BARRIER, BARRIER
+            is_low = any(_top_m(site, each) <= shot.layer_m(0) for each in outline.blocks)
+            words = "barrier (low: outline)" if is_low else "barrier"
         else:
             kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT
         feature = area_feature(kind, outline.rectangle_m, outline.name)
-        found.append(replace(feature, fill=fill, words=_BARRIER if fill is BARRIER else ""))
+        found.append(replace(feature, fill=fill, words=words))
     return found
 
 
