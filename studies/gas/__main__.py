@@ -202,7 +202,7 @@ def oblique(
             found = oblique_loads(angle_deg, cell, until)
             peaks_pa = (
                 *(found.mean_peak_pa, found.largest_peak_pa),
-                *(found.covered_peak_pa, found.largest_told_pa),
+                *(found.covered_peak_pa, found.largest_stated_pa),
             )
             impulses = (found.impulse_pa_s, found.covered_pa_s)
             rows.append(
@@ -210,7 +210,7 @@ def oblique(
                     f"{angle_deg:g}",
                     *(f"{impulse:.0f}" for impulse in impulses),
                     *(f"{peak / PA_PER_KPA:.0f}" for peak in peaks_pa),
-                    f"{1e3 * found.told_m:.1f}",
+                    f"{1e3 * found.covered_m:.1f}",
                 )
             )
     headers = ("turned by (degrees)", "impulse on faces (Pa s)", "reported")

@@ -78,8 +78,8 @@ class FacadeLoads:
         largest_peak_pa: The largest overpressure on any of them.
         covered_pa_s: Mean impulse in the tables of the engine, along the facade's normal.
         covered_peak_pa: Mean over the bays of the largest mean overpressure along that normal.
-        largest_told_pa: The largest of these peaks.
-        told_m: Largest deflection of an elastic component of 10 ms in any bay along that normal.
+        largest_stated_pa: The largest of these peaks.
+        covered_m: Largest deflection of an elastic component of 10 ms in any bay along that normal.
     """
 
     impulse_pa_s: float
@@ -87,8 +87,8 @@ class FacadeLoads:
     largest_peak_pa: float
     covered_pa_s: float
     covered_peak_pa: float
-    largest_told_pa: float
-    told_m: float
+    largest_stated_pa: float
+    covered_m: float
 
 
 def oblique_loads(
@@ -117,8 +117,8 @@ def oblique_loads(
         largest_peak_pa=float(peak[chosen].max()),
         covered_pa_s=float(np.average(covered["impulse_pa_s"], weights=covered["share"])),
         covered_peak_pa=float(peaks_pa.mean()),
-        largest_told_pa=float(peaks_pa.max()),
-        told_m=_deflection_m(bays.recorder.time_s, history_pa),
+        largest_stated_pa=float(peaks_pa.max()),
+        covered_m=_deflection_m(bays.recorder.time_s, history_pa),
     )
 
 
