@@ -327,7 +327,7 @@ def _percent(share: float, error: float = nan) -> str:
     """Return a share in per cent, with its error of the cells in points, if there is one."""
     if share != share:
         return _DASH
-    text = f"{100.0 * share:.1f} %".replace("-", "\N{MINUS SIGN}")
+    text = f"{100.0 * share:z.1f} %".replace("-", "\N{MINUS SIGN}")
     return text if error != error else f"{text} {_PLUS_MINUS} {points(error)}"
 
 

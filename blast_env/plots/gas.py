@@ -375,7 +375,7 @@ def _wall_title(
     now = kind.of_all(values)
     words = f"{kind.summary} {_figures(now)} {kind.unit}"
     if before is not None and np.isfinite(before).any() and kind.of_all(before) > 0.0:
-        change = f"{_PERCENT * (now / kind.of_all(before) - 1.0):+.0f} %"
+        change = f"{_PERCENT * (now / kind.of_all(before) - 1.0):+z.0f} %"
         words += f" ({change.replace('-', MINUS)})"
     return f"{name}\n{words}"
 
