@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from blast_env.evaluation.engines.contract import BlastOutcome, Engine, default_engine, find_engine
-from blast_env.evaluation.engines.particles import BlastResult
+from blast_env.evaluation.engines.particles import BlastResult, ParticleEngine
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # Numba takes a third of a second to import
 
 
 @overload
-def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
+def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
@@ -30,11 +30,11 @@ def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
-    engine: None = ...,
+    *,
+    engine: Literal["event", "pymunk"] | ParticleEngine,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
-    **settings: Any,
-) -> Any: ...  # depends on the site
+) -> BlastResult: ...
 
 
 @overload
@@ -42,10 +42,11 @@ def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
-    engine: str | Engine = ...,
+    engine: str | Engine | None = ...,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
-) -> BlastResult: ...
+    **settings: Any,
+) -> Any: ...  # depends on the site, or on the engine of that name
 
 
 def simulate(
