@@ -177,14 +177,14 @@ def collision_table(
 
 
 def faces_hit(collisions: pd.DataFrame) -> pd.Series:
-    """Return the facade (n,) that each collision hit, from its normal.
+    """Return the wall (n,) that each collision hit, such as "west", from its normal.
 
     Args:
         collisions: A collision table.
     """
     x, y = collisions["normal_x"], collisions["normal_y"]
-    sideways = np.where(x < 0.0, "left", "right")
-    upright = np.where(y < 0.0, "bottom", "top")
+    sideways = np.where(x < 0.0, "west", "east")
+    upright = np.where(y < 0.0, "south", "north")
     names = np.where(x.abs() >= y.abs(), sideways, upright)
     return pd.Series(names, index=collisions.index, dtype="str")
 

@@ -38,10 +38,10 @@ with render_extra():
 
 # Okabe and Ito's colours, distinct for any colour vision.
 _FACADES = (
-    ("left", "#0072B2", "-"),
-    ("right", "#D55E00", "--"),
-    ("top", "#009E73", "-."),
-    ("bottom", "#CC79A7", (0, (1.2, 1.2))),
+    ("west", "#0072B2", "-"),
+    ("east", "#D55E00", "--"),
+    ("north", "#009E73", "-."),
+    ("south", "#CC79A7", (0, (1.2, 1.2))),
 )
 
 _MOST_PANELS = 6

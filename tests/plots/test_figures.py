@@ -69,11 +69,11 @@ def test_impulse_over_time_ends_at_the_sums_of_the_facades(result: BlastResult) 
     assert any("ms" in text.get_text() for text in figure.texts)
 
 
-def test_facades_are_told_by_the_normal(result: BlastResult) -> None:
+def test_the_normal_of_a_collision_gives_its_facade(result: BlastResult) -> None:
     table = result.collisions
     facade = faces_hit(table)
     modules = result.modules.set_index("module_id")
-    on_wall = table[(table["structure"] == "wall") & (facade == "bottom")]
+    on_wall = table[(table["structure"] == "wall") & (facade == "south")]
     assert len(on_wall) > 10
     assert (modules.loc[on_wall["module_id"], "row"] == 0).all()
 
