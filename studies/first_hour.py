@@ -97,7 +97,7 @@ def report(name: str, of_episodes: FloatArray, best: FloatArray | None = None) -
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 12_288,
+    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 20_480,
     algorithm: Annotated[
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
