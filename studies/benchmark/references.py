@@ -87,27 +87,30 @@ def with_judged(
 ) -> dict[str, ScoreReference]:
     """Return references whose best known layout is the best by the judge's cells.
 
+    It must be better than the best rule on cells of 0.5 m, too, so that both have a scale.
+
     Args:
         known: The references.
         judged: Judged submissions, whose layouts are candidates.
         cache: Store of the blasts with cells of 0.5 m.
     """
     coarse, fine = cell_key(0.5), cell_key(JUDGE_CELL_M)
-    found = dict(known)
+    better: dict[str, list[KnownLayout]] = defaultdict(list)
     for submission in judged:
         for run in submission.runs:
-            best = found[run.problem].best
+            best = known[run.problem].best
             if cell_key(submission.cell_m) == fine and run.share < best.shares[fine]:
                 method = f"{submission.method}, {run.budget:,} blasts, seed {run.seed}"
-                new = KnownLayout(method, run.layout, {fine: run.share})
-                found[run.problem] = replace(found[run.problem], best=new)
-    engine = find_engine(JUDGE, 0.5)
-    for name, each in found.items():
-        if coarse not in each.best.shares:
-            evaluator = BlastEvaluator(DEFINITIONS[name].scenario, engine, cache=cache)
-            (share,) = shares_of(DEFINITIONS[name].case, [each.best.layout], evaluator)
-            best = replace(each.best, shares={coarse: share, **each.best.shares})
-            found[name] = replace(each, best=best)
+                better[run.problem].append(KnownLayout(method, run.layout, {fine: run.share}))
+    found, engine = dict(known), find_engine(JUDGE, 0.5)
+    for name, candidates in better.items():
+        evaluator = BlastEvaluator(DEFINITIONS[name].scenario, engine, cache=cache)
+        for each in sorted(candidates, key=lambda each: each.shares[fine]):
+            (share,) = shares_of(DEFINITIONS[name].case, [each.layout], evaluator)
+            if share < known[name].rule.shares[coarse]:
+                best = replace(each, shares={coarse: share, **each.shares})
+                found[name] = replace(known[name], best=best)
+                break
     return found
 
 
