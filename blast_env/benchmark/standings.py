@@ -15,8 +15,8 @@ from blast_env.values import markup_text
 _HEAD = """# Standings
 
 Judged entries to the [benchmark](benchmark.md), with its [score](benchmark.md#score). The files in
-`blast_env/benchmark/data/standings` have the layouts of every run. `blast-env judge --page` writes
-this page from them. The load is that of gas dynamics; intervals are of 95 %.
+`blast_env/benchmark/data/standings` have the layouts of every run. `blast-env judge --page
+standings.md` writes this page from them. The load is that of gas dynamics; intervals are of 95 %.
 """
 
 _NAMED = 3
