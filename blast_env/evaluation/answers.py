@@ -81,7 +81,7 @@ def with_errors(value: str, cells: str = "", sampled: str = "") -> str:
 
 def percent(share: float) -> str:
     """Return a share in per cent; a dash for NaN."""
-    return "-" if isnan(share) else f"{100.0 * share:.1f} %"
+    return "-" if isnan(share) else f"{100.0 * share:z.1f} %"
 
 
 def points(error: float) -> str:

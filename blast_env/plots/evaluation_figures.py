@@ -185,7 +185,7 @@ def _with_error(share: float, error: float) -> str:
     """Return a reduction with its error of the cells, if there is one."""
     if isnan(error):
         return _percent(share)
-    return f"{_PERCENT * share:.1f} % \N{PLUS-MINUS SIGN} {points(error)} (cells)"
+    return f"{_PERCENT * share:z.1f} % \N{PLUS-MINUS SIGN} {points(error)} (cells)"
 
 
 def _interval(reduction: Estimate) -> str:

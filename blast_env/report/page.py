@@ -379,7 +379,7 @@ def _counted(load: TargetLoad) -> str:
 
 
 def _percent(share: float) -> str:
-    return _NONE if isnan(share) else f"{100.0 * share:.1f} %".replace("-", _MINUS)
+    return _NONE if isnan(share) else f"{100.0 * share:z.1f} %".replace("-", _MINUS)
 
 
 def _css(text: str) -> Markup:

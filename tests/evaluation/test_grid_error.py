@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, evaluate_layout
-from blast_env.evaluation.answers import points, with_errors, worse
+from blast_env.evaluation.answers import percent, points, with_errors, worse
 from blast_env.evaluation.cases import LoadCaseSet, draw_threats
 from blast_env.evaluation.engines import final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
@@ -83,6 +83,7 @@ def test_words() -> None:
         "48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)"
     )
     assert with_errors("48.5 %", points(float("nan"))) == "48.5 %"
+    assert [percent(each) for each in (-4e-4, -6e-4, float("nan"))] == ["0.0 %", "-0.1 %", "-"]
 
 
 def test_final_statements_have_it_beside_each_number() -> None:
