@@ -4,11 +4,23 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from blast_env.benchmark import DEFINITIONS, Definition, Run, make, play
+from blast_env.benchmark import (
+    DEFINITIONS,
+    JUDGE_CELL_M,
+    Definition,
+    JudgedRun,
+    JudgedSubmission,
+    Run,
+    make,
+    play,
+    stored_references,
+)
 from blast_env.errors import UnknownNameError
+from blast_env.evaluation import BlastStore
+from blast_env.geometry import Layout
 from studies.benchmark import methods
 from studies.benchmark.__main__ import app
-from studies.benchmark.references import mean_curve, named_definition
+from studies.benchmark.references import mean_curve, named_definition, with_judged
 from tests.benchmark.row import RowEngine
 
 
@@ -32,6 +44,24 @@ def test_a_curve_has_the_score_of_the_best_layout_by_then() -> None:
     runs = [Run("a", 4, 0, 4, (), curve=((1, 0.7), (2, 0.5))), Run("a", 4, 1, 3, ())]
     curve = mean_curve(runs, {"a": (0.6, 0.4)}, np.arange(5))
     assert curve == pytest.approx([0.0, 0.0, 0.25, 0.25, 0.25])
+
+
+def test_a_best_known_layout_is_better_than_the_rule_on_the_cells_of_a_search_too() -> None:
+    """The empty layout is not, whatever the judge's cells say of it; the stored one is."""
+    name, known = "control_room-known-v2", stored_references()
+    stored = known[name].best
+
+    def judged(layout: Layout, share: float) -> JudgedSubmission:
+        ends = known[name].rule.shares["0.25"], stored.shares["0.25"]
+        return JudgedSubmission(
+            "mine", JUDGE_CELL_M, "gas", (JudgedRun(name, 50, 0, 50, layout, share, *ends),)
+        )
+
+    empty, better = judged((), 0.1), judged(stored.layout, 0.2)
+    found = with_judged(known, [empty, better], BlastStore())[name].best
+    assert (found.method, found.layout) == ("mine, 50 blasts, seed 0", stored.layout)
+    assert found.shares["0.5"] == pytest.approx(stored.shares["0.5"], rel=1e-3)
+    assert with_judged(known, [empty], BlastStore()) == known
 
 
 def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.MonkeyPatch) -> None:
