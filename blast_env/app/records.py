@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import AnswerTable, points
+from blast_env.evaluation.answers import AnswerTable, percent, points
 from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.grid_error import CellErrors, LoadOf
@@ -327,7 +327,7 @@ def _percent(share: float, error: float = nan) -> str:
     """Return a share in per cent, with its error of the cells in points, if there is one."""
     if share != share:
         return _DASH
-    text = f"{100.0 * share:z.1f} %".replace("-", "\N{MINUS SIGN}")
+    text = percent(share).replace("-", "\N{MINUS SIGN}")
     return text if error != error else f"{text} {_PLUS_MINUS} {points(error)}"
 
 

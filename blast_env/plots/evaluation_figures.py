@@ -5,7 +5,7 @@ from math import isnan
 
 import numpy as np
 
-from blast_env.evaluation.answers import points
+from blast_env.evaluation.answers import percent, points
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.geometry import Layout, layout_counts
 from blast_env.plots.plan import (
@@ -178,14 +178,14 @@ def _subtitle(evaluation: Evaluation) -> str:
 
 
 def _percent(share: float) -> str:
-    return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"
+    return "-" if isnan(share) else f"{_PERCENT * share:z.0f} %"
 
 
 def _with_error(share: float, error: float) -> str:
     """Return a reduction with its error of the cells, if there is one."""
     if isnan(error):
         return _percent(share)
-    return f"{_PERCENT * share:z.1f} % \N{PLUS-MINUS SIGN} {points(error)} (cells)"
+    return f"{percent(share)} \N{PLUS-MINUS SIGN} {points(error)} (cells)"
 
 
 def _interval(reduction: Estimate) -> str:

@@ -20,10 +20,7 @@ from blast_env.gas.probes import Snapshots
 from blast_env.gas.spherical_stage import SphericalStage
 from blast_env.geometry import Rectangle
 from blast_env.plots.canvas import Frame, Sheet
-from blast_env.plots.gas import (
-    MINUS,
-    gas_heading,
-)
+from blast_env.plots.gas import MINUS, gas_heading
 from blast_env.plots.plan import (
     BARRIER,
     BORDER,

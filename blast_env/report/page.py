@@ -15,7 +15,7 @@ import numpy as np
 import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation.answers import worse
+from blast_env.evaluation.answers import percent, worse
 from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.engines.pieces import outcome_words
@@ -379,7 +379,7 @@ def _counted(load: TargetLoad) -> str:
 
 
 def _percent(share: float) -> str:
-    return _NONE if isnan(share) else f"{100.0 * share:z.1f} %".replace("-", _MINUS)
+    return _NONE if isnan(share) else percent(share).replace("-", _MINUS)
 
 
 def _css(text: str) -> Markup:
