@@ -87,7 +87,7 @@ def with_judged(
 ) -> dict[str, ScoreReference]:
     """Return references whose best known layout is the best by the judge's cells.
 
-    It must be better than the best rule on cells of 0.5 m, too, so that both have a scale.
+    It must be better than the best rule on cells of 0.5 m, too, so that both sizes have a scale.
 
     Args:
         known: The references.
