@@ -1,5 +1,6 @@
 """Calibration of the particle model, and the reference curves: the public names."""
 
+from blast_env.curves import Friedlander, kingery_bulmash, scaled_distance
 from blast_env.particles.calibration.laws import (
     FewDistancesWarning,
     FitMetrics,
@@ -26,14 +27,11 @@ from blast_env.particles.calibration.model import (
     save_calibration,
     stored_calibrations,
 )
-from blast_env.particles.calibration.references import (
+from blast_env.particles.calibration.paper_table import (
     PAPER_COLUMNS,
     PAPER_UFC_LABEL,
-    Friedlander,
-    kingery_bulmash,
     paper_table,
     paper_ufc_column,
-    scaled_distance,
 )
 
 __all__ = [

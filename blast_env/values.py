@@ -6,11 +6,19 @@ from collections.abc import Sequence
 from html import escape
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, Union
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, value_text
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
+
+Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
+"""Several numbers; a single number is a float."""
 
 MOST_SEED: Final = 2**63 - 1
 """The largest seed: tables and files keep it in 64 bits."""
@@ -219,6 +227,52 @@ def path_of(value: Any) -> Path:
             f"path is {value_text(text)} of {len(text)} characters, must have at most {_MOST_PATH}"
         )
     return Path(text)
+
+
+def checked_array(
+    name: str,
+    values: ArrayLike,
+    *,
+    least: float | None = None,
+    above: float | None = None,
+    dimensions: int | None = None,
+) -> FloatArray:
+    """Return numbers as an array of floats.
+
+    Args:
+        name: Name of the numbers for the message.
+        values: A number or an array of them.
+        least: Inclusive lower bound.
+        above: Exclusive lower bound.
+        dimensions: Required number of dimensions; `None` for any.
+
+    Raises:
+        BlastEnvError: If a value is not a number, not finite or out of bounds; the message gives
+            its place, its value and the bound.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise BlastEnvError(f"{name} must be made of numbers: {error}") from error
+    if dimensions is not None and array.ndim != dimensions:
+        raise BlastEnvError(f"{name} has {array.ndim} dimensions, must have {dimensions}")
+    checks: list[tuple[NDArray[np.bool_], str]] = [(~np.isfinite(array), "a finite number")]
+    if least is not None:
+        checks.append((array < least, f"at least {least:g}"))
+    if above is not None:
+        checks.append((array <= above, f"above {above:g}"))
+    for bad, bound in checks:
+        if bad.any():
+            place, value = first_bad(name, array, bad)
+            raise BlastEnvError(f"{place} is {value:g}, must be {bound}")
+    return array
+
+
+def first_bad(name: str, array: FloatArray, bad: NDArray[np.bool_]) -> tuple[str, float]:
+    """Return the place and the value of the first bad number."""
+    index = np.argwhere(bad)[0].tolist()
+    place = f"{name}[{', '.join(map(str, index))}]" if index else name
+    return place, float(array[tuple(index)])
 
 
 def count_of(noun: str, count: int) -> str:

@@ -171,7 +171,9 @@ DATA: Final = {
 
 def test_the_stored_calibrations_are_what_they_were() -> None:
     folder = files("blast_env.particles.calibration")
-    stored = [*(folder / "stored").iterdir(), *(folder / "data").iterdir()]
+    curves = files("blast_env.curves")
+    stored = [*(folder / "stored").iterdir()]
+    stored += [*(folder / "data").iterdir(), *(curves / "data").iterdir()]
     found = {
         entry.name: sha256(entry.read_bytes()).hexdigest()[:32]
         for entry in stored

@@ -24,7 +24,7 @@ from blast_env.particles.calibration.model import (
     SimulatedQuantity,
     save_calibration,
 )
-from blast_env.particles.calibration.references import paper_table
+from blast_env.particles.calibration.paper_table import paper_table
 from blast_env.site import Scenario, load_scenario
 from blast_env.tables import write_csv
 from blast_env.values import plain_number

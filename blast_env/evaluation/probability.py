@@ -27,11 +27,11 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
+from blast_env.curves import Quantity, burst_of, within_curves
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import BuildingResponse, Consequences
 from blast_env.evaluation.grid_error import GridError
 from blast_env.evaluation.standing import bay_places
-from blast_env.particles.calibration.references import Quantity, burst_of, within_curves
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond

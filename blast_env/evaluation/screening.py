@@ -17,13 +17,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation.consequences import Verdict
-from blast_env.evaluation.standing import bay_middles
-from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
-from blast_env.geometry import Element
-from blast_env.layout.build_site import build_site, worst_places
-from blast_env.particles.calibration.references import (
+from blast_env.curves import (
     CURVES_SCALED_M,
     Burst,
     Quantity,
@@ -31,6 +25,12 @@ from blast_env.particles.calibration.references import (
     in_the_open,
     within_curves,
 )
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.consequences import Verdict
+from blast_env.evaluation.standing import bay_middles
+from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
+from blast_env.geometry import Element
+from blast_env.layout.build_site import build_site, worst_places
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import damage_number, level_of, triangle, under_triangle

@@ -18,7 +18,7 @@ from blast_env.particles.calibration.laws import (
     fit_power_law,
     fit_proportional,
 )
-from blast_env.particles.calibration.references import paper_table
+from blast_env.particles.calibration.paper_table import paper_table
 
 CELLS: Final = ("scaled", "abs", "pct")
 """The computed cells of a row of Tables 1 to 3, by their names in `paper_table`."""

@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.curves import Friedlander, burst_of, kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasResult
 from blast_env.geometry import Rectangle
-from blast_env.particles.calibration.references import Friedlander, burst_of, kingery_bulmash
 from blast_env.plots.plan import FAINT, QUIET_INK
 from blast_env.plots.site_plan import (
     add_bar,

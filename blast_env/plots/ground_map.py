@@ -8,13 +8,13 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.curves import Burst, burst_of, kingery_bulmash
+from blast_env.curves import Quantity as CurveQuantity
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasResult
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import GroundMap
 from blast_env.gas.spherical_stage import SphericalStage, spherical_stage
-from blast_env.particles.calibration.references import Burst, burst_of, kingery_bulmash
-from blast_env.particles.calibration.references import Quantity as CurveQuantity
 from blast_env.plots.gas import (
     both_results,
     gas_heading,

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.curves import burst_of, kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasResult
 from blast_env.gas.engine import Recorders
@@ -14,7 +15,6 @@ from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import Snapshots
 from blast_env.gas.solver import Recorder
 from blast_env.gas.spherical_stage import spherical_stage
-from blast_env.particles.calibration.references import burst_of, kingery_bulmash
 from blast_env.plots.canvas import Frame
 from blast_env.plots.film_files import FilmPlan, Footage
 from blast_env.plots.gas import (

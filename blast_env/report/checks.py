@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.particles.calibration.references import (
+from blast_env.curves import (
     CURVES_SCALED_M,
     burst_of,
     kingery_bulmash,

@@ -13,7 +13,7 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from blast_env.particles.calibration.references import largest_reflected_peak_pa
+from blast_env.curves import largest_reflected_peak_pa
 from blast_env.response.facade import peak_factor
 from blast_env.site.blast_site import BlastSite
 from blast_env.site.sight import in_sight

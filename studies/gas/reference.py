@@ -12,13 +12,13 @@ from typing import Final, Literal
 
 import numpy as np
 
+from blast_env.curves import Quantity, kingery_bulmash
 from blast_env.gas.ending import is_known
 from blast_env.gas.faces import exposed_faces
 from blast_env.gas.grid import FaceKind, GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges
 from blast_env.gas.solver import GasSolver
 from blast_env.gas.source import TNT, GasCharge, set_charge
-from blast_env.particles.calibration.references import Quantity, kingery_bulmash
 
 Wave = Literal["reflected", "incident"]
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.screening import Screening, facades_for, screen, stand_offs
-from blast_env.particles.calibration.references import kingery_bulmash, oblique
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import damage_number, level_of, under_triangle

@@ -13,10 +13,10 @@ from matplotlib.image import AxesImage
 from PIL import Image
 
 from blast_env import Charge
+from blast_env.curves import kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.probes import GroundMap
-from blast_env.particles.calibration.references import kingery_bulmash
 from blast_env.plots.film import write_film
 from blast_env.plots.film_files import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from blast_env.particles.calibration.references import kingery_bulmash
+from blast_env.curves import kingery_bulmash
 from blast_env.report import Study
 from blast_env.report.checks import checks_of
 from blast_env.report.page import report_html

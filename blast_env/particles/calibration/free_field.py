@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter
 from scipy.special import stdtrit
 
+from blast_env.curves import kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.particles.calibration.laws import (
     Fit,
@@ -31,7 +32,7 @@ from blast_env.particles.calibration.model import (
     ReferenceSection,
     SimulatedQuantity,
 )
-from blast_env.particles.calibration.references import kingery_bulmash, paper_ufc_column
+from blast_env.particles.calibration.paper_table import paper_ufc_column
 from blast_env.particles.scene import build_scene
 from blast_env.particles.start import STARTS, VERSIONS
 from blast_env.provenance import package_version

@@ -9,26 +9,20 @@ paper, the error at distances left out of the fit and bootstrap intervals of the
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, Union, overload
+from typing import Final, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.statistics import Estimate
-
-if TYPE_CHECKING:  # takes a third of a second to import
-    import pandas as pd
+from blast_env.values import Numbers, checked_array, first_bad
 
 LawName = Literal["proportional", "linear", "power"]
 """The laws that `blast-env calibrate` fits."""
-
-Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
-"""Several numbers; a single number is a float."""
 
 LEAST_DISTANCES: Final = 4
 """A fit on fewer distances warns: two coefficients then fit almost any data."""
@@ -97,7 +91,7 @@ class ScalingLaw(ABC):
             simulated = self._backward(reference)
         out_of_reach = ~(np.isfinite(simulated) & (simulated >= 0.0))
         if out_of_reach.any():
-            place, value = _first("i_reference", reference, out_of_reach)
+            place, value = first_bad("i_reference", reference, out_of_reach)
             raise BlastEnvError(
                 f"{place} is {value:g}, which {self} gives for no i_sim of at least 0"
             )
@@ -216,52 +210,6 @@ def fit_power_law(i_sim: Numbers, i_reference: Numbers) -> PowerLaw:
     checked_array("i_sim", x, above=0.0)
     intercept, exponent = _line(np.log(x), np.log(y))
     return PowerLaw(A=float(np.exp(intercept)), B=exponent)
-
-
-def checked_array(
-    name: str,
-    values: ArrayLike,
-    *,
-    least: float | None = None,
-    above: float | None = None,
-    dimensions: int | None = None,
-) -> FloatArray:
-    """Return numbers as an array of floats.
-
-    Args:
-        name: Name of the numbers for the message.
-        values: A number or an array of them.
-        least: Inclusive lower bound.
-        above: Exclusive lower bound.
-        dimensions: Required number of dimensions; `None` for any.
-
-    Raises:
-        BlastEnvError: If a value is not a number, not finite or out of bounds; the message gives
-            its place, its value and the bound.
-    """
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise BlastEnvError(f"{name} must be made of numbers: {error}") from error
-    if dimensions is not None and array.ndim != dimensions:
-        raise BlastEnvError(f"{name} has {array.ndim} dimensions, must have {dimensions}")
-    checks: list[tuple[NDArray[np.bool_], str]] = [(~np.isfinite(array), "a finite number")]
-    if least is not None:
-        checks.append((array < least, f"at least {least:g}"))
-    if above is not None:
-        checks.append((array <= above, f"above {above:g}"))
-    for bad, bound in checks:
-        if bad.any():
-            place, value = _first(name, array, bad)
-            raise BlastEnvError(f"{place} is {value:g}, must be {bound}")
-    return array
-
-
-def _first(name: str, array: FloatArray, bad: NDArray[np.bool_]) -> tuple[str, float]:
-    """Return the place and the value of the first bad number."""
-    index = np.argwhere(bad)[0].tolist()
-    place = f"{name}[{', '.join(map(str, index))}]" if index else name
-    return place, float(array[tuple(index)])
 
 
 def _like_input(array: FloatArray) -> float | FloatArray:

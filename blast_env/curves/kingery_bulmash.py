@@ -1,24 +1,18 @@
-"""References for simulated loads: the paper's table, Kingery & Bulmash, Friedlander."""
+"""Peaks, impulses and times of a blast wave in the open by Kingery & Bulmash, and by angle."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from io import StringIO
-from math import factorial, isfinite
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Literal, get_args, overload
+from typing import Final, Literal, get_args, overload
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.particles.calibration.laws import Numbers, checked_array
-from blast_env.tables import Column
-
-if TYPE_CHECKING:  # takes a third of a second to import
-    import pandas as pd
+from blast_env.values import Numbers, checked_array
 
 Quantity = Literal[
     "incident_overpressure",
@@ -39,25 +33,6 @@ CURVES_SCALED_M: Final = (0.0674, 40.0)
 
 SURFACE_BURST_SCALED_M: Final = 0.4
 """Scaled height of a charge, m/kg^(1/3), below which `burst_of` counts it as on the ground."""
-
-PAPER_UFC_LABEL: Final = "the paper's UFC column"
-"""Required name of its i_ufc, which matches no curve of UFC 3-340-02 at all distances."""
-
-PAPER_COLUMNS: Final = (
-    Column("r_m", "m", "distance R"),
-    Column("i_ufc_psi_s", "psi*s", "impulse i_ufc that the paper ascribes to UFC 3-340-02"),
-    Column("i_sim", "sim", "impulse i_sim of the paper's simulation"),
-    Column("t1_scaled", "psi*s", "Table 1, proportional law: i_scaled as printed"),
-    Column("t1_abs", "psi*s", "Table 1: E_abs as printed"),
-    Column("t1_pct", "%", "Table 1: E% as printed"),
-    Column("t2_scaled", "psi*s", "Table 2, linear law: i_scaled as printed"),
-    Column("t2_abs", "psi*s", "Table 2: E_abs as printed"),
-    Column("t2_pct", "%", "Table 2: E% as printed"),
-    Column("t3_scaled", "psi*s", "Table 3, power law: i_scaled as printed"),
-    Column("t3_abs", "psi*s", "Table 3: E_abs as printed"),
-    Column("t3_pct", "%", "Table 3: E% as printed"),
-)
-"""The columns of `paper_table`."""
 
 # A unit of the data file: its factor to SI, and whether W^(1/3) scales the value.
 _TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
@@ -110,30 +85,6 @@ class _Curve:
             u = segment.a + segment.b * np.log10(z[own])
             value[own] = 10.0 ** np.polynomial.polynomial.polyval(u, segment.c)
         return self.factor_to_si * value
-
-
-def paper_table() -> "pd.DataFrame":
-    """Return Tables 1 to 3 of the paper, one row per distance; see `PAPER_COLUMNS`.
-
-    Every call returns a new frame.
-    """
-    import pandas as pd
-
-    return pd.read_csv(StringIO(_read("paper_tables.csv")), dtype=np.float64)
-
-
-def paper_ufc_column() -> "pd.Series":
-    """Return the paper's UFC column, psi*s, by the distance in metres.
-
-    The paper ascribes it to UFC 3-340-02, but it differs from the standard: at 30 to 120 m it is
-    within 8 % of Kingery and Bulmash's incident impulse of about 10 t TNT on the ground, at 15 m
-    1.9 times as large. For the standard's curves use `kingery_bulmash`.
-    """
-    import pandas as pd
-
-    table = paper_table()
-    index = pd.Index(table["r_m"], name="distance_m")
-    return pd.Series(table["i_ufc_psi_s"].to_numpy(), index=index, name=PAPER_UFC_LABEL)
 
 
 @overload
@@ -307,7 +258,9 @@ def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> 
 @cache
 def _curves() -> Mapping[tuple[str, str], _Curve]:
     """Return all curves by burst and quantity."""
-    document = json.loads(_read("kingery_bulmash.json"))
+    document = json.loads(
+        (files("blast_env.curves") / "data" / "kingery_bulmash.json").read_text(encoding="utf-8")
+    )
     curves = {}
     for burst, key in _BURST_KEYS.items():
         for quantity, entry in document[key].items():
@@ -316,170 +269,3 @@ def _curves() -> Mapping[tuple[str, str], _Curve]:
             )
             curves[burst, quantity] = _Curve(*_TO_SI[entry["unit"]], segments)
     return MappingProxyType(curves)
-
-
-def _read(name: str) -> str:
-    """Return the text of a file of the package's data."""
-    return (files("blast_env.particles.calibration") / "data" / name).read_text(encoding="utf-8")
-
-
-_SERIES_BELOW: Final = 0.5  # of b, where the closed form loses digits
-_SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range(16))
-_BISECTIONS: Final = 64
-
-
-@dataclass(frozen=True)
-class Friedlander:
-    """p(t) = p_2 (1 - t / t_2) exp(-b t / t_2), with t from the arrival (equation 1).
-
-    Attributes:
-        peak: Peak overpressure p_2, Pa; or the unit of a fitted history.
-        positive_duration_s: Duration t_2 of the positive phase.
-        decay: The wave parameter b, dimensionless; 0 is a triangle.
-        arrival_s: Arrival time of the shock.
-    """
-
-    peak: float
-    positive_duration_s: float
-    decay: float
-    arrival_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            BlastEnvError: If peak or duration is not above 0, decay or arrival is below 0, or any
-                value is not a finite number.
-        """
-        for name in ("peak", "positive_duration_s"):
-            checked_array(name, getattr(self, name), above=0.0, dimensions=0)
-        for name in ("decay", "arrival_s"):
-            checked_array(name, getattr(self, name), least=0.0, dimensions=0)
-
-    @classmethod
-    def from_impulse(
-        cls, peak: float, positive_duration_s: float, impulse: float, arrival_s: float = 0.0
-    ) -> "Friedlander":
-        """Return the waveform with a given peak, duration and impulse.
-
-        A decaying waveform has an impulse below that of the triangle, peak * duration / 2. For
-        larger impulses there is no decay coefficient of at least 0. The waveform is then the
-        triangle with this peak and this impulse, so that equation (2) still holds, and its duration
-        is 2 impulse / peak, as of UFC 3-340-02's equivalent triangle; see `is_triangular`.
-
-        Args:
-            peak: Peak overpressure, Pa.
-            positive_duration_s: Duration of the positive phase.
-            impulse: Impulse of the positive phase, Pa*s.
-            arrival_s: Arrival time of the shock.
-
-        Raises:
-            BlastEnvError: If a number is not finite or out of bounds, or the impulse is so far
-                below that of the triangle that the decay coefficient is not a finite number.
-        """
-        for name, value in (
-            ("peak", peak),
-            ("positive_duration_s", positive_duration_s),
-            ("impulse", impulse),
-        ):
-            checked_array(name, value, above=0.0, dimensions=0)
-        share = impulse / peak / positive_duration_s
-        if share >= 0.5:
-            return cls(peak, 2.0 * impulse / peak, 0.0, arrival_s)
-        if share == 0.0 or not isfinite(1.0 / share):
-            raise BlastEnvError(
-                f"impulse is {impulse:g}, which is too small a share of peak * duration, "
-                f"{peak:g} * {positive_duration_s:g}, for a Friedlander waveform"
-            )
-        return cls(peak, positive_duration_s, _solve_decay(share), arrival_s)
-
-    @property
-    def is_triangular(self) -> bool:
-        """Whether the waveform is the triangular limit."""
-        return self.decay == 0.0
-
-    @overload
-    def pressure(self, time_s: float) -> float: ...
-
-    @overload
-    def pressure(self, time_s: Numbers) -> FloatArray: ...
-
-    def pressure(self, time_s: float | Numbers) -> float | FloatArray:
-        """Return the overpressure of the positive phase, unit of `peak`; 0 before and after it.
-
-        Args:
-            time_s: Times, from the detonation.
-
-        Raises:
-            BlastEnvError: If a time is not a finite number.
-        """
-        x = (checked_array("time_s", time_s) - self.arrival_s) / self.positive_duration_s
-        inside = np.clip(x, 0.0, 1.0)
-        wave = self.peak * (1.0 - inside) * np.exp(-self.decay * inside)
-        value = np.where(x >= 0.0, wave, 0.0)
-        return float(value) if value.ndim == 0 else value
-
-    def impulse(self) -> float:
-        """Return the impulse of the positive phase (equation 2), unit of `peak` times s."""
-        return float(self.peak * self.positive_duration_s * _impulse_share(self.decay))
-
-    @overload
-    def impulse_until(self, time_s: float) -> float: ...
-
-    @overload
-    def impulse_until(self, time_s: Numbers) -> FloatArray: ...
-
-    def impulse_until(self, time_s: float | Numbers) -> float | FloatArray:
-        """Return the impulse until each time, unit of `peak` times s.
-
-        Args:
-            time_s: Times, from the detonation.
-
-        Raises:
-            BlastEnvError: If a time is not a finite number.
-        """
-        x = (checked_array("time_s", time_s) - self.arrival_s) / self.positive_duration_s
-        share = impulse_share_until(np.clip(x, 0.0, 1.0), self.decay)
-        value = self.peak * self.positive_duration_s * share
-        return float(value) if value.ndim == 0 else value
-
-
-def impulse_share_until(x: FloatArray, decay: float | FloatArray) -> FloatArray:
-    """Return the integral of (1 - s) exp(-b s) from 0 to x.
-
-    Args:
-        x: Times since the arrival in positive durations, 0 to 1.
-        decay: The coefficient b, at least 0; broadcast against `x`.
-    """
-    z = np.asarray(decay * x)
-    # (1 - s) = (1 - x) + (x - s); the second part is a complete wave of shorter duration.
-    level = np.ones_like(z)
-    np.divide(-np.expm1(-z), z, out=level, where=z > 0.0)
-    share: FloatArray = x * ((1.0 - x) * level + x * _impulse_share(z))
-    return share
-
-
-def _impulse_share(decay: float | FloatArray) -> FloatArray:
-    """Return (b - 1 + exp(-b)) / b^2, the integral of (1 - x) exp(-b x) from 0 to 1."""
-    b = np.asarray(decay, dtype=np.float64)
-    large = np.maximum(b, _SERIES_BELOW)
-    closed = (large + np.expm1(-large)) / large / large
-    series = np.polynomial.polynomial.polyval(np.minimum(b, _SERIES_BELOW), _SERIES)
-    share: FloatArray = np.where(b < _SERIES_BELOW, series, closed)
-    return share
-
-
-def _solve_decay(share: float) -> float:
-    """Return the b > 0 with `_impulse_share(b) == share`, for a share between 0 and 1/2.
-
-    The share decreases with b and lies between 1 / (b + 2) and 1 / b, which bounds b to an interval
-    of width 2.
-    """
-    low, high = max(1.0 / share - 2.0, 0.0), 1.0 / share
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2.0
-        if _impulse_share(middle) > share:
-            low = middle
-        else:
-            high = middle
-    return (low + high) / 2.0
