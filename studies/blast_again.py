@@ -17,7 +17,6 @@ import pandas as pd
 import typer
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.design.surrogate.fitting import elements
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines import find_engine
 from blast_env.files import make_folder
@@ -26,6 +25,7 @@ from blast_env.particles.parquet import read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.fitting import elements
 from blast_env.tables import table_of
 from studies.blast_table import COLUMNS, load_row, scenario_of
 

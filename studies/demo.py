@@ -26,8 +26,6 @@ from blast_env.cli.output import (
 )
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
-from blast_env.design.surrogate import SurrogateEngine, SurrogateSite, site_of
-from blast_env.design.surrogate.correction import Correction
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ReductionReward, Transition
 from blast_env.evaluation import (
@@ -51,6 +49,8 @@ from blast_env.plots.film import write_film
 from blast_env.plots.gas import facades
 from blast_env.plots.site_picture import site_picture
 from blast_env.site import Scenario, load_scenario
+from blast_env.surrogate import SurrogateEngine, SurrogateSite, site_of
+from blast_env.surrogate.correction import Correction
 from blast_env.values import generator
 
 HEADERS: Final = (

@@ -19,23 +19,8 @@ from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
+from blast_env.design.search.learnt import Guesses, LearntSearch, improved
 from blast_env.design.search.moves import Moves, random_walls
-from blast_env.design.surrogate.fitting import (
-    Errors,
-    LoadErrors,
-    Loads,
-    Predictions,
-    Samples,
-    errors,
-    errors_of,
-    fit,
-    folds,
-    held_out_predictions,
-    predictions,
-)
-from blast_env.design.surrogate.intervals import covered, interval_factor
-from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surrogate
-from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
@@ -48,6 +33,21 @@ from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import HELD_OUT_SITES
 from blast_env.statistics import reductions
+from blast_env.surrogate.fitting import (
+    Errors,
+    LoadErrors,
+    Loads,
+    Predictions,
+    Samples,
+    errors,
+    errors_of,
+    fit,
+    folds,
+    held_out_predictions,
+    predictions,
+)
+from blast_env.surrogate.intervals import covered, interval_factor
+from blast_env.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS, scenario_of, site_name

@@ -9,8 +9,6 @@ from typing import Literal
 import numpy as np
 
 from blast_env import load_scenario, simulate
-from blast_env.design.surrogate.relations import relations
-from blast_env.design.surrogate.ways import Ways
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
@@ -21,6 +19,8 @@ from blast_env.gas.solver import GasSolver, Settling
 from blast_env.gas.source import GasCharge, set_charge
 from blast_env.layout.build_site import draw_charge
 from blast_env.site import Scenario
+from blast_env.surrogate.relations import relations
+from blast_env.surrogate.ways import Ways
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from blast_env.app.solids import boxes
-from blast_env.design.surrogate import packaged_surrogate, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
@@ -17,6 +16,7 @@ from blast_env.plots.plan import structure_features
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.sites import Visibility
+from blast_env.surrogate import packaged_surrogate, site_of
 from tests.builders import block
 from tests.gas_sites import site_document
 from tests.io.importing.maps import charge, outline, rectangle, written

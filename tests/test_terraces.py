@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from blast_env.app.solids import boxes
-from blast_env.design.surrogate import packaged_surrogate, site_of
 from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.engines import simulate
@@ -25,6 +24,7 @@ from blast_env.site import Scenario, ScenarioError
 from blast_env.site.blast_site import Charge
 from blast_env.site.heights import highest_top_m
 from blast_env.sites import Visibility
+from blast_env.surrogate import packaged_surrogate, site_of
 from tests import builders
 from tests.builders import block, point, zone
 from tests.catalogue_sites import item

@@ -169,7 +169,7 @@ def _methods(
         with import_extra("agents", "trained agents"):
             from blast_agents.training import load_agent
 
-            from blast_env.design.surrogate import LearntSearch
+            from blast_env.design.search.learnt import LearntSearch
     for run in runs:
         agent = LearntSearch(agent=load_agent(run))
         yield f"agent {run.resolve().name}", method_of(agent), asked or BUDGETS[:2]

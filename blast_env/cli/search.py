@@ -223,7 +223,8 @@ def _method(
     if name != _SURROGATE or initial:
         return find_proposer(name, initial), None
     # Here, because it takes half a second to import.
-    from blast_env.design.surrogate import load_surrogate, packaged_surrogate, search_by
+    from blast_env.design.search.learnt import search_by
+    from blast_env.surrogate import load_surrogate, packaged_surrogate
 
     guessing = packaged_surrogate() if surrogate is None else load_surrogate(surrogate)
     return search_by(guessing), guessing.digest
@@ -423,7 +424,7 @@ def _package_proposal(
     )
     if out is not None:
         make_folder(out)
-        from blast_env.design.surrogate import packaged_surrogate  # takes half a second to import
+        from blast_env.surrogate import packaged_surrogate  # takes half a second to import
 
         digest = packaged_surrogate().digest
         provenance = {"surrogate": digest, "command": command(), "versions": versions()}

@@ -31,7 +31,7 @@ from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import reductions
 
 if TYPE_CHECKING:  # half a second to import
-    from blast_env.design.surrogate.search import Guesses
+    from blast_env.design.search.learnt import Guesses
 
 HIDDEN_THREATS: Final = 8
 """Number of threats for an unknown charge."""
@@ -71,7 +71,8 @@ class PackageProposer:
             report: Called with the progress.
         """
         # Imported here because the import takes half a second.
-        from blast_env.design.surrogate import packaged_surrogate, search_by
+        from blast_env.design.search.learnt import search_by
+        from blast_env.surrogate import packaged_surrogate
 
         result = search_by(packaged_surrogate()).propose(problem, 0, seed, report)
         by, guesses = "the surrogate of gas dynamics", _guesses(problem)
@@ -108,8 +109,8 @@ def _remedy(problem: DesignProblem) -> str:
 
 def _guesses(problem: DesignProblem) -> "Guesses":
     # Imported here because the import takes half a second.
-    from blast_env.design.surrogate import packaged_surrogate
-    from blast_env.design.surrogate.search import Guesses, case_for
+    from blast_env.design.search.learnt import Guesses, case_for
+    from blast_env.surrogate import packaged_surrogate
 
     return Guesses.of(packaged_surrogate(), case_for(problem.scenario, problem.known_charge))
 

@@ -16,15 +16,15 @@ from stable_baselines3 import PPO
 
 from blast_env.arrays import FloatArray
 from blast_env.benchmark import BenchmarkProblem
+from blast_env.design.search.learnt import Guesses, improved
 from blast_env.design.search.registry import rule_layouts
-from blast_env.design.surrogate import SurrogateEngine
-from blast_env.design.surrogate.network import packaged_surrogate
-from blast_env.design.surrogate.search import Guesses, improved
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation import LoadCaseSet
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnySource, Scenario
 from blast_env.site.vehicles import source_of
+from blast_env.surrogate import SurrogateEngine
+from blast_env.surrogate.network import packaged_surrogate
 from blast_env.values import generator
 
 _FIT_EVERY: Final = 5

@@ -21,15 +21,15 @@ from blast_env.design.search import (
     layouts_by_rule,
     registry,
 )
+from blast_env.design.search.learnt import LearntSearch
 from blast_env.design.search.registry import ProposerRow
-from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner
 from tests.design.search_cases import small_scenario
-from tests.design.test_surrogate import YARD, by_hand
 from tests.gas_sites import hut
+from tests.surrogate.test_surrogate import YARD, by_hand
 
 OWN = {
     "corner": ProposerRow(

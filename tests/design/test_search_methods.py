@@ -17,8 +17,8 @@ from blast_env.design.search import (
     layouts_by_rule,
     proposers,
 )
+from blast_env.design.search.learnt import LearntSearch
 from blast_env.design.search.methods import PopulationAnnealingSearch
-from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.cases import search_set

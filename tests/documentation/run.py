@@ -34,7 +34,7 @@ from tests.documentation.exceptions import (
 )
 from tests.documentation.pages import OTHERS, ROOT, STEPS, Cell, Command, Step
 
-COPIED: Final = ("docs", "examples", "scenarios", "studies", "tests", "blast_env/design/surrogate")
+COPIED: Final = ("docs", "examples", "scenarios", "studies", "tests", "blast_env/surrogate")
 MOST_S: Final = 1200.0
 """The longest that a step may take."""
 

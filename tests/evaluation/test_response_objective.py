@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from blast_env.design.search import DesignProblem, find_proposer
-from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
@@ -18,6 +17,7 @@ from blast_env.layout import LayoutState
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import peak_corrected, peak_factor, respond
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.engine import SurrogateEngine
 from tests.catalogue_sites import WALL
 from tests.evaluation.cases import evaluate_against
 from tests.site.test_hardening import TAKEN, glazed_yard

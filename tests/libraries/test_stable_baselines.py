@@ -9,12 +9,12 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import obs_as_tensor
 
-from blast_env.design.surrogate import SurrogateEngine
 from blast_env.site import Scenario
+from blast_env.surrogate import SurrogateEngine
 from tests.catalogue_sites import ITEMS
-from tests.design.test_surrogate import by_hand
 from tests.libraries.ids import BARRIER_IDS, arguments
 from tests.office_park import office_park
+from tests.surrogate.test_surrogate import by_hand
 
 pytestmark = pytest.mark.slow
 _STEPS = 4

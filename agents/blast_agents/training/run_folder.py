@@ -23,7 +23,6 @@ from blast_agents.training.hyperparameters import (
     SITES_SECTION,
     Hyperparameters,
 )
-from blast_env.design.surrogate.engine import engine_to_train_on, is_surrogate
 from blast_env.documents import DocumentError, checked_as, described, read_text
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import SINGLE_ARRAYS
@@ -33,6 +32,7 @@ from blast_env.files import is_temporary, make_folder, write_text
 from blast_env.provenance import versions
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.sites import FAMILIES
+from blast_env.surrogate.engine import engine_to_train_on, is_surrogate
 
 THREATS: Final = ("visible", "hidden")
 

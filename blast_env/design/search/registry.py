@@ -104,7 +104,7 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
         "random": ProposerRow(f"{_METHODS}:RandomSearch", "random search"),
         "best_rule": ProposerRow(f"{_METHODS}:BestRuleSearch", "the best rule"),
         "surrogate": ProposerRow(
-            "blast_env.design.surrogate.search:packaged_search",
+            "blast_env.design.search.learnt:packaged_search",
             "search by the surrogate",
             ProposerKind.LEARNT,
         ),

@@ -18,14 +18,14 @@ from blast_env.design.search.problem import (
 )
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.design.search.session import Plan, Search, SearchSession
-from blast_env.design.surrogate.correction import Correction
-from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
-from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
+from blast_env.surrogate.correction import Correction
+from blast_env.surrogate.network import Surrogate, packaged_surrogate
+from blast_env.surrogate.walls import SurrogateSite, site_of
 from blast_env.values import generator
 
 _DRAWN_CHARGES: Final = 16

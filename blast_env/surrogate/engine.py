@@ -9,14 +9,14 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_env.compilation import compilation_notice
-from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_env.design.surrogate.walls import Memory, SurrogateSite, site_of
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
+from blast_env.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
+from blast_env.surrogate.walls import Memory, SurrogateSite, site_of
 
 SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""

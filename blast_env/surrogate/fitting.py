@@ -15,7 +15,11 @@ from scipy.stats import spearmanr
 from torch import Tensor, nn
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.design.surrogate.network import (
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Piece
+from blast_env.site import Scenario
+from blast_env.site.blast_site import Charge
+from blast_env.surrogate.network import (
     HIDDEN,
     IMPULSE_POWER,
     MESSAGE,
@@ -28,12 +32,8 @@ from blast_env.design.surrogate.network import (
     bounded,
     log_loads,
 )
-from blast_env.design.surrogate.relations import RELATIONS
-from blast_env.design.surrogate.walls import FEATURES, INPUTS, site_of
-from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Piece
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.surrogate.relations import RELATIONS
+from blast_env.surrogate.walls import FEATURES, INPUTS, site_of
 
 MEMBERS: Final = 5
 _BATCH: Final = 6

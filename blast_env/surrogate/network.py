@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.design.surrogate.relations import RELATIONS
-from blast_env.design.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.response.damage import BayDamage
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.relations import RELATIONS
+from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
 
 IntArray = NDArray[np.int64]
 AnyFloats = NDArray[np.floating[Any]]

@@ -1,6 +1,6 @@
 """Positions of solids relative to a charge and a point on a wall.
 
-Paths describe the open space between charge and point (`blast_env.design.surrogate.ways`).
+Paths describe the open space between charge and point (`blast_env.surrogate.ways`).
 Relations add the solids beside and behind the charge, which reflect the wave, the distance of each
 solid and its extent beyond the detours. The axes follow the straight path in plan: ahead is from
 the charge to the point, and aside is the side that the wall of the point faces, so that a mirrored

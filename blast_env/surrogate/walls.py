@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
-from blast_env.design.surrogate.relations import RELATIONS, relations
-from blast_env.design.surrogate.ways import SHARES, Ways
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.contract import structure_response
 from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
@@ -20,6 +18,8 @@ from blast_env.site import AnyStructure, Scenario
 from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.facade import NamedBay
 from blast_env.site.terraces import ground_below_m, is_open_below
+from blast_env.surrogate.relations import RELATIONS, relations
+from blast_env.surrogate.ways import SHARES, Ways
 from blast_env.units import MODULE_SIDE_M
 
 _ALONG_M: Final = 1.0
