@@ -194,7 +194,8 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
         f"{imported.scenario.simulation.preset}"
     )
     sums = Counter(each.fate for each in imported.ledger.entries)
-    print_line(f"ledger: {', '.join(f'{fate} {count}' for fate, count in sums.items())}")
+    words = ", ".join(f"{fate} {count}" for fate, count in sums.items())
+    print_line(f"ledger of {imported.ledger.objects} objects: {words}")
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)

@@ -178,11 +178,10 @@ def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
         if cut:
             kind = "parts above their building" if cut[0].is_part else "buildings over buildings"
             detail = f"by {', '.join(each.place for each in cut)}"
+            fate, outcome = Fate.CUT, "overlap left out"
             if shape.area < least_m2:
-                kind, shape = f"{kind}, covered", shapely.Polygon()
-            else:
-                kind = f"{kind}, overlap left out"
-            site.ledger.add(Fate.MERGED, kind, thing.place, thing.name, detail)
+                fate, outcome, shape = Fate.MERGED, "covered", shapely.Polygon()
+            site.ledger.add(fate, f"{kind}, {outcome}", thing.place, thing.name, detail)
         left[k] = replace(thing, geometry=shape)
     return [*found, *(each for each in left if not each.geometry.is_empty)]
 

@@ -85,7 +85,7 @@ class FittedBuilding:
         part_of: Place in the file of the building of which it is a part, or an empty string.
         deviation: Deviation of the modules from the outline.
         is_cut: Whether the site's border cuts it.
-        facade: Its storeys and windows, see `Thing`.
+        facade: Its storeys and windows, see `MapFeature`.
     """
 
     name: str

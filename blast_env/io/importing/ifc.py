@@ -88,7 +88,7 @@ def read_ifc(site_map: SiteMap) -> None:
             for each in own:
                 detail = f"of {found.place}"
                 ledger.add(Fate.MERGED, "parts of a building", _place(each.element), detail=detail)
-            if "facade:width" in found.tags:
+            if found.facade:
                 ledger.add(Fate.GUESSED, _GLASS, found.place, detail="annealed 6 mm")
     for each in products:
         if each.id() not in solids:
@@ -154,14 +154,15 @@ def _building(model: Any, building: Any, solids: list[_Solid]) -> MapFeature | N
     tags: dict[str, str | float | bool] = {"building": "yes", "height": float(height_m)}
     if building.Name:
         tags["name"] = str(building.Name)
+    facade: dict[str, float] = {}
     if windows:
-        tags |= _facade(outline, windows, max(storeys, 1), np.sort(floors_m) + ground_m)
-    return MapFeature(outline, tags, _place(building))
+        facade = _facade(outline, windows, max(storeys, 1), np.sort(floors_m) + ground_m)
+    return MapFeature(outline, tags, _place(building), facade=facade)
 
 
 def _facade(
     outline: BaseGeometry, windows: list[_Solid], storeys: int, floors_m: FloatArray
-) -> dict[str, str | float | bool]:
+) -> dict[str, float]:
     """Return the facade of a building: its storeys, and the commonest window and its spacing."""
     sizes = Counter(
         (round(_width_m(each), 1), round(each.high_m - each.low_m, 1)) for each in windows
@@ -173,11 +174,11 @@ def _facade(
     ]
     apart_m = max(outline.length * storeys / len(windows), 1.1 * width_m)
     return {
-        "facade:storeys": float(storeys),
-        "facade:width": width_m,
-        "facade:height": height_m,
-        "facade:sill": round(float(np.median(sills_m)), 2),
-        "facade:bay": round(float(np.clip(apart_m, *_BAYS_M)), 1),
+        "storeys": float(storeys),
+        "width": width_m,
+        "height": height_m,
+        "sill": round(float(np.median(sills_m)), 2),
+        "bay": round(float(np.clip(apart_m, *_BAYS_M)), 1),
     }
 
 

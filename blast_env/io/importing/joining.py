@@ -90,10 +90,14 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             used.setdefault(k, len(found) - 1)
     bridged_m = np.zeros(len(lines))
     np.maximum.at(bridged_m, owners, gaps_m)
+    chiefs = {each.place for each in found}
     for k, outline in used.items():
         words = f", {1000.0 * bridged_m[k]:.1f} mm bridged" if bridged_m[k] > _ROUNDING_M else ""
-        detail = f"outline of {found[outline].place}{words}"
-        ledger.add(Fate.CLOSED, JOINED, lines[k].place, lines[k].name, detail)
+        own = lines[k]
+        ledger.add(Fate.CLOSED, JOINED, own.place, own.name, f"of {found[outline].place}{words}")
+        if own.place not in chiefs:
+            detail = f"with {found[outline].place}"
+            ledger.add(Fate.MERGED, "sides of outlines", own.place, own.name, detail)
     left = [replace(each, fault=OPEN) for k, each in enumerate(lines) if k not in used]
     return [*found, *left]
 

@@ -18,24 +18,25 @@ _MOST_NAMED: Final = 50
 
 
 class Fate(StrEnum):
-    """The fate of an object in an import."""
+    """The fate of an object in an import, or a remark on one."""
 
     READ = "read"
     MERGED = "merged"
+    CUT = "cut"
     CLOSED = "closed"
     GUESSED = "guessed"
     LEFT_OUT = "left out"
     PASSED = "not of the site"
 
 
-CHANGES: Final = (Fate.MERGED, Fate.CLOSED, Fate.GUESSED, Fate.LEFT_OUT)
-"""The fates that change the site, which are notes of an import."""
+CHANGES: Final = (Fate.MERGED, Fate.CUT, Fate.CLOSED, Fate.GUESSED, Fate.LEFT_OUT)
+"""The entries that change the site, which are notes of an import."""
 
 STRICT: Final = (Fate.GUESSED, Fate.LEFT_OUT)
 """The fates that `--strict` refuses."""
 
-FATES: Final = (Fate.MERGED, Fate.CLOSED, Fate.LEFT_OUT, Fate.PASSED)
-"""The fates that say where an object is; a guess is in addition to them."""
+FATES: Final = (Fate.READ, Fate.MERGED, Fate.LEFT_OUT, Fate.PASSED)
+"""The fates, of which each object of a file has one; the others are remarks in addition."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class LedgerEntry:
 class Ledger:
     """The entries of an import; see `Fate`.
 
-    Every object of a file that is not used has an entry that says why.
+    Every object of a file has one entry of `FATES`, and maybe remarks: cut, closed, guessed.
 
     Attributes:
         entries: All entries, in the order of the fates done.
@@ -84,6 +85,11 @@ class Ledger:
     def of(self, *fates: Fate) -> tuple[LedgerEntry, ...]:
         """Return the entries of some fates."""
         return tuple(each for each in self.entries if each.fate in fates)
+
+    @property
+    def objects(self) -> int:
+        """Number of the objects of the file."""
+        return len(self.of(*FATES))
 
     def save(self, path: Path) -> Path:
         """Write all entries as JSON, or as text for other suffixes; return the path.

@@ -1,6 +1,6 @@
 """Common form of maps and drawings: outlines, lines and points with their tags."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.io.importing.ledger import FATES, Fate, Ledger
+from blast_env.io.importing.ledger import FATES, Fate, Ledger, LedgerEntry
 from blast_env.io.importing.options import ImportOptions
 
 MOST_BYTES: Final = 50_000_000
@@ -46,12 +46,15 @@ class MapFeature:
         place: Its place in the file, for messages: `features[12]`, `way 4711`.
         fault: Why it is not usable, in the plural: `ways without all nodes`; an empty string if it
             is.
+        facade: Number of storeys, width, height and sill of its windows, and the width of a bay,
+            m; empty if the source has none.
     """
 
     geometry: BaseGeometry
     tags: Tags
     place: str
     fault: str = ""
+    facade: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -94,7 +97,9 @@ class SiteMap:
         check_count(self.path, self.points, MOST_POINTS, "points")
 
     def settle(self, used: Mapping[str, str]) -> None:
-        """Complete the ledger, so that it has every object of the file; no guess about others.
+        """Complete the ledger: one fate for each object of the file, no guess about others.
+
+        Of an object that is used, pieces that are left out or part of others are a remark.
 
         Args:
             used: The kinds of those used on the site, by their places in the file.
@@ -106,12 +111,13 @@ class SiteMap:
             for each, (x, y) in zip(self.features, middles, strict=True)
             if x == x
         }
+        self.ledger.entries = list(_one_fate_each(self.ledger.entries, set(used)))
         fates = {each.place for each in self.ledger.of(*FATES)}
-        for each in self.features:
-            if each.place in used:
-                self.ledger.add(Fate.READ, used[each.place], each.place)
-            elif each.place not in fates:
-                self.ledger.add(Fate.LEFT_OUT, _UNUSED, each.place)
+        for feature in self.features:
+            if feature.place in used:
+                self.ledger.add(Fate.READ, used[feature.place], feature.place)
+            elif feature.place not in fates:
+                self.ledger.add(Fate.LEFT_OUT, _UNUSED, feature.place)
         elsewhere = {each.place for each in self.ledger.of(Fate.PASSED)}
         self.ledger.entries = [
             replace(each, position=positions.get(each.place))
@@ -134,6 +140,20 @@ class SiteMap:
                 f"{self.path}: {owner.place}: has the coordinate {coordinates[is_wrong][0]:g}, "
                 f"must be within {MOST_COORDINATE:g}"
             )
+
+
+def _one_fate_each(entries: Iterable[LedgerEntry], used: set[str]) -> Iterator[LedgerEntry]:
+    """Yield the entries, with one fate for each object at most, and none for those used.
+
+    Other fates are those of pieces: a remark, unless the piece is outside the site.
+    """
+    known = set(used)
+    for entry in entries:
+        if entry.fate not in FATES or entry.place not in known:
+            known |= {entry.place} if entry.fate in FATES else set()
+            yield entry
+        elif entry.fate is not Fate.PASSED:
+            yield replace(entry, fate=Fate.CUT)
 
 
 def check_count(path: Path, count: int, most: int, what: str) -> None:

@@ -53,8 +53,7 @@ class Thing:
         carries: Whether the source marks it as a terrace.
         width_m: Width of a street, m.
         is_part: Whether it is a part of a building with a height of its own.
-        facade: Number of storeys, width, height and sill of its windows, and the width of a bay,
-            m; empty if the source has none.
+        facade: Its storeys and windows, see `MapFeature`.
         fault: Why it cannot be used; an empty string if it can.
     """
 
@@ -293,11 +292,7 @@ def _thing(feature: MapFeature, role: Role, site_map: SiteMap) -> Thing:
         tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
         kind=kind.lower(),
         width_m=_width_m(feature, site_map.ledger) if role is Role.CHARGE else None,
-        facade={
-            key.removeprefix("facade:"): float(value)
-            for key, value in tags.items()
-            if key.startswith("facade:")
-        },
+        facade=feature.facade,
         is_part="building:part" in tags and not _says(tags, "building"),
         fault=_fault(feature, role),
     )
