@@ -22,7 +22,6 @@ from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
     LoadUnit,
-    ScaledImpulse,
     load_calibration,
     save_calibration,
     stored_calibrations,
@@ -33,6 +32,7 @@ from blast_env.particles.calibration.paper_table import (
     paper_table,
     paper_ufc_column,
 )
+from blast_env.results import ScaledImpulse
 
 __all__ = [
     "PAPER_COLUMNS",

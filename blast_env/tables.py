@@ -16,6 +16,10 @@ _FORMULA_MARKS: Final = ("=", "+", "-", "@", "\t", "\r")
 """First characters of texts in a CSV file that spreadsheets read as formulas."""
 
 
+RunRecord = dict[str, str | int | float]
+"""The scenario, parameters, versions and end of a run, as names and plain values."""
+
+
 class Column(NamedTuple):
     """A column of a table.
 

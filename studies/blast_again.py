@@ -21,7 +21,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines import find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.particles.parquet import read_frame, write_table
+from blast_env.parquet import read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge

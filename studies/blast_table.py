@@ -17,7 +17,7 @@ from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, BlastStore, StructureLoad, draw_threats
 from blast_env.files import make_folder
-from blast_env.particles.parquet import write_table
+from blast_env.parquet import write_table
 from blast_env.provenance import versions
 from blast_env.site import Scenario, bundled_scenarios
 from blast_env.site.blast_site import OUTWARDS

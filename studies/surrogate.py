@@ -27,7 +27,7 @@ from blast_env.evaluation.cases import in_turn
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.particles.parquet import read_frame
+from blast_env.parquet import read_frame
 from blast_env.provenance import command, versions
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario

@@ -13,7 +13,7 @@ from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
 from blast_env.gas.engine import GasRun
-from blast_env.particles.run import EndReason
+from blast_env.results import EndReason
 from blast_env.site.blast_site import Charge
 from tests.builders import block
 from tests.gas_sites import WALL, hut

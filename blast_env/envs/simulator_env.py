@@ -22,7 +22,8 @@ from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.layout.build_site import draw_threat
 from blast_env.particles.balls import CollisionType
-from blast_env.particles.run import BlastRun, EndReason
+from blast_env.particles.run import BlastRun
+from blast_env.results import EndReason
 from blast_env.site import AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite
 from blast_env.values import real_number

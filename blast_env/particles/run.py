@@ -4,7 +4,6 @@ The main result is the record of the collisions with modules (paper, section 2.8
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from blast_env.particles.balls import distance_to_rectangle
 from blast_env.particles.scene import Scene
 from blast_env.particles.structure import ModularObstacle
+from blast_env.results import EndReason
 from blast_env.units import UNITS_PER_M
 
 COLLISION_DTYPE = np.dtype(
@@ -101,16 +101,6 @@ def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:
     across = np.abs(vx * normal_y - vy * normal_x)
     angle: NDArray[np.float64] = np.arctan2(across, towards)
     return angle
-
-
-class EndReason(StrEnum):
-    """Reason for the end of a run."""
-
-    OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
-    TIME_LIMIT = "the time limit was reached"
-    TIME_ASKED = "the requested time was reached"
-    LOADS_KNOWN = "all required loads are known"
-    EVENT_LIMIT = "the limit of collisions was reached before the end"
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,12 +11,9 @@ from blast_env.particles.balls import CollisionType
 from blast_env.particles.calibration.model import LoadUnit
 from blast_env.particles.run import CollisionArray, incidence_angle_rad
 from blast_env.particles.structure import ModularObstacle
-from blast_env.tables import Column, as_types, texts
+from blast_env.tables import Column, RunRecord, as_types, texts
 
 Columns = tuple[Column, ...]
-
-RunRecord = dict[str, str | int | float]
-"""The scenario, parameters, versions and end of a run, as names and plain values."""
 
 
 class RecordedBlast(Protocol):

@@ -17,7 +17,7 @@ from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import draw_charge
-from blast_env.particles.run import EndReason
+from blast_env.results import EndReason
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import Charge

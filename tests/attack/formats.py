@@ -33,8 +33,9 @@ from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile, write_layout
+from blast_env.parquet import _run_record, checked_table, write_table
 from blast_env.particles.calibration.model import load_calibration, save_calibration
-from blast_env.particles.parquet import _run_record, checked_table, write_parquet
+from blast_env.particles.tables import COLLISION_COLUMNS
 from blast_env.site import Scenario, load_scenario, save_scenario
 from blast_env.site.blast_site import Charge
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
@@ -197,7 +198,8 @@ def _map(suffix: str, **options: Any) -> Callable[[Path], Format]:
 
 def _parquet(folder: Path) -> Format:
     path = folder / "a.parquet"
-    write_parquet(simulate(small_scenario(), engine="event"), path)
+    result = simulate(small_scenario(), engine="event")
+    write_table(result.collisions, COLLISION_COLUMNS, result.run_record, path)
 
     def read(path: Path) -> Any:  # without the process of `read_parquet`, whose start takes long
         return _run_record(path, checked_table(path).schema.metadata or {})

@@ -33,8 +33,9 @@ from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import is_temporary
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.layout import write_layout
+from blast_env.parquet import write_table
 from blast_env.particles.calibration.model import load_calibration, save_calibration
-from blast_env.particles.parquet import write_parquet
+from blast_env.particles.tables import COLLISION_COLUMNS
 from blast_env.plots.figures import save_figure
 from blast_env.plots.film import write_film
 from blast_env.report.page import write_report
@@ -108,7 +109,9 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "layout.dxf": lambda path: export_layout(_plan(), path),
         "table.csv": lambda path: write_csv(_result().collisions, path),
         "table.xlsx": lambda path: _result().to_excel(path),
-        "table.parquet": lambda path: write_parquet(_result(), path),
+        "table.parquet": lambda path: write_table(
+            _result().collisions, COLLISION_COLUMNS, _result().run_record, path
+        ),
         "figure.png": _figure,
         "figure.svg": _figure,
         "figure.pdf": _figure,

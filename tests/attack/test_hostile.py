@@ -31,7 +31,8 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
-from blast_env.particles.parquet import checked_table, write_parquet
+from blast_env.parquet import checked_table, write_table
+from blast_env.particles.tables import COLLISION_COLUMNS
 from blast_env.response.components import find_component
 from blast_env.response.facade import respond
 from blast_env.site import Scenario, ScenarioError, save_scenario
@@ -114,7 +115,7 @@ def test_a_path_that_is_none_is_refused_by_every_writer() -> None:
     result = simulate(BALLISTIC_COURTYARD, engine="event")
     for write in (
         result.to_excel,
-        partial(write_parquet, result),
+        partial(write_table, result.collisions, COLLISION_COLUMNS, result.run_record),
         lambda path: write_atomically(path).__enter__(),
     ):
         with pytest.raises(BlastEnvError, match=r"^path is 5, must be a path"):
@@ -244,7 +245,9 @@ def test_a_table_has_the_kinds_of_its_columns(
 ) -> None:
     pq.write_table(pa.table({column: values}), tmp_path / "a.parquet")
     with pytest.raises(BlastEnvError, match=f"a.parquet: {words}"):
-        checked_table(tmp_path / "a.parquet")
+        checked_table(
+            tmp_path / "a.parquet", [each for each in COLLISION_COLUMNS if each.name == column]
+        )
 
 
 def test_values_are_counted_before_they_are_read() -> None:

@@ -13,8 +13,9 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult, simulate
+from blast_env.parquet import METADATA_KEY, read_parquet, write_table
 from blast_env.particles.balls import CollisionType
-from blast_env.particles.parquet import METADATA_KEY, read_parquet, write_parquet
+from blast_env.particles.recording import write_blast
 from blast_env.particles.run import COLLISION_DTYPE, CollisionArray
 from blast_env.particles.structure import ModularObstacle
 from blast_env.particles.tables import (
@@ -25,18 +26,19 @@ from blast_env.particles.tables import (
     module_table,
     structure_table,
 )
-from blast_env.particles.workbook import (
-    EXCEL_ROWS,
-    record_cells,
-    write_workbook,
-)
 from blast_env.site import (
     Scenario,
 )
 from blast_env.tables import Column
+from blast_env.workbook import EXCEL_ROWS, record_cells
 from tests.builders import block, point, site, square, zone
 from tests.design.search_cases import small_scenario
 from tests.particles import workbooks
+
+
+def write_collisions(blast: BlastResult, path: Path) -> Path:
+    return write_table(blast.collisions, COLLISION_COLUMNS, blast.run_record, path)
+
 
 SEED = 2**60 + 1
 """Greater than what Excel can hold as a number."""
@@ -182,7 +184,11 @@ def test_table_and_record_come_back_exactly(
     request: pytest.FixtureRequest, tmp_path: Path, fixture: str
 ) -> None:
     result: BlastResult = request.getfixturevalue(fixture)
-    table, record = read_parquet(write_parquet(result, tmp_path / "run.parquet"))
+    table, record = read_parquet(
+        write_table(
+            result.collisions, COLLISION_COLUMNS, result.run_record, tmp_path / "run.parquet"
+        )
+    )
     pd.testing.assert_frame_equal(table, result.collisions, check_exact=True)
     assert record == result.run_record
 
@@ -193,12 +199,12 @@ def test_a_folder_that_looks_like_a_partition_adds_no_column(
 ) -> None:
     folder = tmp_path / "seed=3"
     folder.mkdir()
-    table, _ = read_parquet(write_parquet(blast, folder / "run.parquet"))
+    table, _ = read_parquet(write_collisions(blast, folder / "run.parquet"))
     assert list(table.columns) == [column.name for column in COLLISION_COLUMNS]
 
 
 def test_every_field_has_its_unit_and_meaning(blast: BlastResult, tmp_path: Path) -> None:
-    schema = pq.read_schema(write_parquet(blast, tmp_path / "run.parquet"))
+    schema = pq.read_schema(write_collisions(blast, tmp_path / "run.parquet"))
     for column in COLLISION_COLUMNS:
         metadata = schema.field(column.name).metadata
         assert metadata[b"unit"].decode() == column.unit
@@ -206,12 +212,19 @@ def test_every_field_has_its_unit_and_meaning(blast: BlastResult, tmp_path: Path
 
 
 def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path) -> None:
-    first, second = (write_parquet(blast, tmp_path / f"{name}.parquet") for name in "ab")
+    first, second = (
+        write_table(
+            blast.collisions, COLLISION_COLUMNS, blast.run_record, tmp_path / f"{name}.parquet"
+        )
+        for name in "ab"
+    )
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_reading_a_truncated_file(blast: BlastResult, tmp_path: Path) -> None:
-    path = write_parquet(blast, tmp_path / "run.parquet")
+    path = write_table(
+        blast.collisions, COLLISION_COLUMNS, blast.run_record, tmp_path / "run.parquet"
+    )
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     with pytest.raises(BlastEnvError, match=r"run\.parquet: damaged or not a Parquet file"):
@@ -301,7 +314,7 @@ def test_a_long_table_goes_on_in_further_sheets(
     blast: BlastResult, tmp_path: Path, sheets: int
 ) -> None:
     per_sheet = -(-len(blast.collisions) // sheets)
-    path = write_workbook(blast, tmp_path / "long.xlsx", max_rows_per_sheet=per_sheet + 1)
+    path = write_blast(blast, tmp_path / "long.xlsx", max_rows_per_sheet=per_sheet + 1)
     workbook = workbooks.load(path)
     names = ["Collisions", "Collisions 2", "Collisions 3"][:sheets]
     assert [name for name in workbook.sheetnames if "Collisions" in name] == names
@@ -324,7 +337,7 @@ def test_a_limit_that_excel_cannot_have_is_refused(
     blast: BlastResult, tmp_path: Path, limit: int
 ) -> None:
     with pytest.raises(ValueError, match=f"is {limit}, must be between 2 and {EXCEL_ROWS}"):
-        write_workbook(blast, tmp_path / "blast.xlsx", limit)
+        write_blast(blast, tmp_path / "blast.xlsx", limit)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.particles.run import EndReason
+from blast_env.results import EndReason
 from blast_env.site import Scenario
 from studies.gas.cells import CellLoads, difference
 from studies.gas.corners import BlockGeometry, corner_waves

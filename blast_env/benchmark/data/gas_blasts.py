@@ -64,7 +64,7 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
     """
     import pandas as pd
 
-    from blast_env.particles.parquet import checked_table, read_parquet
+    from blast_env.parquet import checked_table, read_parquet
 
     if name != "gas_blasts":
         raise UnknownNameError("data set", name, ("gas_blasts",))

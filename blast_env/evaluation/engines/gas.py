@@ -59,11 +59,10 @@ from blast_env.gas.tables import (
 )
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_site import build_site, draw_threat, outlines
-from blast_env.particles.calibration.model import ScaledImpulse
-from blast_env.particles.run import EndReason
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
 from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
+from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import (
     AnyCharge,
     AnyScenario,
@@ -82,7 +81,7 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
     from blast_env.gas.engine import GasRun, Recorders
-    from blast_env.particles.tables import RunRecord
+    from blast_env.tables import RunRecord
 
 NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
 """Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
@@ -556,7 +555,7 @@ class GasResult:
 
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with structures, modules, gauges and the run record; return its path."""
-        from blast_env.particles.workbook import SheetTable, write_tables
+        from blast_env.workbook import SheetTable, write_workbook
 
         tables = [
             SheetTable("Structures", self.structures, (*STRUCTURE_COLUMNS, *STANDING_COLUMNS)),
@@ -572,7 +571,7 @@ class GasResult:
             tables.append(SheetTable("Bays", self.bays, LOADED_BAY_COLUMNS))
         if len(self.pieces):
             tables.append(SheetTable("Pieces", self.pieces, PIECE_COLUMNS))
-        return write_tables(self.run_record, tables, path)
+        return write_workbook(self.run_record, tables, path)
 
     def _notes(self, index: int) -> tuple[str, ...]:
         notes = list(self.run.notes)

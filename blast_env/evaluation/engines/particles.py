@@ -27,14 +27,14 @@ from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
     LoadUnit,
-    ScaledImpulse,
     scenario_calibration,
 )
-from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
+from blast_env.particles.run import BallStates, BlastRun, CollisionArray
 from blast_env.particles.scene import Scene, build_scene
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
 from blast_env.particles.structure import ModularObstacle
 from blast_env.provenance import versions
+from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.values import path_of
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
 
     from blast_env.particles.event.engine import EventRun
     from blast_env.particles.pymunk.engine import PymunkRun
-    from blast_env.particles.tables import RunRecord
+    from blast_env.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 200
 _CALIBRATED: Final = ReasonedStanding(
@@ -386,6 +386,6 @@ class BlastResult:
 
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and run record; return its path."""
-        from blast_env.particles.workbook import write_workbook
+        from blast_env.particles.recording import write_blast
 
-        return write_workbook(self, path_of(path))
+        return write_blast(self, path_of(path))

@@ -12,7 +12,7 @@ from importlib.resources import files
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -24,6 +24,7 @@ from blast_env.geometry import Rectangle
 from blast_env.particles.balls import distance_to_rectangle
 from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
 from blast_env.particles.structure import ModularObstacle
+from blast_env.results import ScaledImpulse
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.parameters import SimulationParameters, parameters_digest
@@ -40,25 +41,6 @@ LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
 
 class CalibrationError(BlastEnvError):
     """A calibration that cannot be read, or does not belong to a simulation."""
-
-
-class ScaledImpulse(NamedTuple):
-    """A simulated impulse in the units of the reference.
-
-    Attributes:
-        pa_s: Impulse per area, Pa*s.
-        in_range: Whether distance and charge are within the calibration's range.
-        notes: Reasons why not, one sentence each.
-    """
-
-    pa_s: float
-    in_range: bool
-    notes: tuple[str, ...]
-
-    @property
-    def psi_s(self) -> float:
-        """Impulse per area in the paper's unit, psi*s."""
-        return self.pa_s / PA_PER_PSI
 
 
 Amount = Annotated[float, Field(ge=0.0)]

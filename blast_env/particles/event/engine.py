@@ -37,8 +37,9 @@ from blast_env.particles.event.state import (
     with_walls,
     world_of,
 )
-from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog, EndReason
+from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog
 from blast_env.particles.scene import Scene
+from blast_env.results import EndReason
 
 # Reasons why the loop returns.
 UNTIL: Final = 0

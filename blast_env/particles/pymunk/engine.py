@@ -23,8 +23,9 @@ from blast_env.particles.pymunk.space import (
     build_space,
     height_above,
 )
-from blast_env.particles.run import BallStates, CollisionLog, EndReason, can_reach
+from blast_env.particles.run import BallStates, CollisionLog, can_reach
 from blast_env.particles.scene import Scene
+from blast_env.results import EndReason
 
 _TOO_FAST: Final = 2.0
 """Ratio of a speed to the design speed of the step up to which the step is kept.

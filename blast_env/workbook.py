@@ -15,14 +15,7 @@ from xlsxwriter.exceptions import XlsxFileError
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder, write_atomically
-from blast_env.particles.tables import (
-    COLLISION_COLUMNS,
-    RecordedBlast,
-    RunRecord,
-    modules_in_pa_s,
-    structures_in_pa_s,
-)
-from blast_env.tables import Column
+from blast_env.tables import Column, RunRecord
 from blast_env.values import path_of
 
 SUFFIX: Final = ".xlsx"
@@ -66,11 +59,6 @@ _LABELS: Final[Mapping[str, str]] = MappingProxyType({"impulse_sim": "impulse, m
 _EXPLANATION_COLUMNS: Final = tuple(
     Column(name, "", "") for name in ("sheet", "column", "unit", "meaning")
 )
-_UNITS: Final = (
-    ("sim", "simulation unit of impulse: sim mass x sim unit / s"),
-    ("sim mass", "simulation unit of mass"),
-    ("sim units/s", "simulation units of length per second; 4 units are 1 m"),
-)
 
 
 class SheetTable(NamedTuple):
@@ -82,17 +70,23 @@ class SheetTable(NamedTuple):
 
 
 def write_workbook(
-    blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
+    record: RunRecord,
+    tables: Sequence[SheetTable],
+    path: str | Path,
+    *,
+    units: Sequence[tuple[str, str]] = (),
+    max_rows_per_sheet: int = EXCEL_ROWS,
 ) -> Path:
-    """Write a workbook with the run record and the tables.
+    """Write a workbook with a run record and tables, and a sheet that explains their columns.
 
-    Its sheets are `Run`, `Structures`, `Modules`, `Collisions` and `Columns`, which explains every
-    column. A table too long for one sheet continues in `Collisions 2` and so on. The file is
-    written whole or not at all, and two workbooks of the same blast are identical to the last byte.
+    A table too long for one sheet continues in `Collisions 2` and so on. The file is written whole
+    or not at all, and is identical to the last byte for the same content.
 
     Args:
-        blast: The blast.
+        record: The run record, with the version of the package.
+        tables: The tables.
         path: The file, with the suffix `.xlsx`; an existing one is replaced.
+        units: Units with their meanings, for the sheet that explains the columns.
         max_rows_per_sheet: The most rows of a table on one sheet, its header included.
 
     Returns:
@@ -106,44 +100,12 @@ def write_workbook(
         raise ValueError(
             f"max_rows_per_sheet is {max_rows_per_sheet}, must be between 2 and {EXCEL_ROWS}"
         )
-    record = blast.run_record
-    tables = (
-        SheetTable("Structures", *structures_in_pa_s(blast.structures, blast.load_unit)),
-        SheetTable("Modules", *modules_in_pa_s(blast.modules, blast.load_unit)),
-        SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
-    )
-    with _workbook(path, record, f"Blast {record['scenario']}, seed {record['seed']}") as writer:
+    run = f"seed {record['seed']}" if "seed" in record else f"engine {record['engine']}"
+    with _workbook(path, record, f"Blast {record['scenario']}, {run}") as writer:
         sheets = _Sheets(writer, max_rows_per_sheet)
         sheets.add_record(record)
-        for each in tables:
-            sheets.add(each)
-        sheets.add(_explanations(tables, _UNITS))
-    return path_of(path)
-
-
-def write_tables(record: RunRecord, tables: Sequence[SheetTable], path: str | Path) -> Path:
-    """Write a workbook with a run record and tables, and a sheet that explains their columns.
-
-    As with `write_workbook`, the file is written whole or not at all, and is identical to the last
-    byte for the same content.
-
-    Args:
-        record: The run record, with the version of the package.
-        tables: The tables.
-        path: The file.
-
-    Returns:
-        The path.
-
-    Raises:
-        BlastEnvError: If the suffix is wrong or the file cannot be written there.
-    """
-    title = f"Blast {record['scenario']}, engine {record['engine']}"
-    with _workbook(path, record, title) as writer:
-        sheets = _Sheets(writer, EXCEL_ROWS)
-        sheets.add_record(record)
-        for each in (*tables, _explanations(tables, ())):
-            sheets.add(each)
+        for table in (*tables, _explanations(tables, units)):
+            sheets.add(table)
     return path_of(path)
 
 

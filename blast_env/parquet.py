@@ -1,4 +1,4 @@
-"""The collision table as Parquet, with the run record, the units and the meanings in the file."""
+"""Tables as Parquet, with the run record, the units and the meanings in the file."""
 
 import json
 from collections.abc import Sequence
@@ -12,9 +12,8 @@ import pyarrow.parquet as pq
 from blast_env.documents import parse_json
 from blast_env.errors import BlastEnvError, shortened, value_text
 from blast_env.files import read_regular, write_atomically
-from blast_env.particles.tables import COLLISION_COLUMNS, RecordedBlast, RunRecord
 from blast_env.reading import read_apart
-from blast_env.tables import Column
+from blast_env.tables import Column, RunRecord
 from blast_env.values import path_of
 
 METADATA_KEY: Final = b"blast_env"
@@ -29,29 +28,13 @@ MOST_VALUES: Final = 20_000_000
 """Most values of a table that is read: a million collisions."""
 
 
-def write_parquet(blast: RecordedBlast, path: str | Path) -> Path:
-    """Write the collision table, exact to the last bit, with the run record in the metadata.
-
-    The metadata of each field has its `unit` and its `meaning`. The file is written whole or not
-    at all.
-
-    Args:
-        blast: The blast.
-        path: The file, with the suffix `.parquet`; an existing one is replaced.
-
-    Returns:
-        The path.
-
-    Raises:
-        BlastEnvError: If the suffix is wrong or the file cannot be written there.
-    """
-    return write_table(blast.collisions, COLLISION_COLUMNS, blast.run_record, path)
-
-
 def write_table(
     frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord, path: str | Path
 ) -> Path:
-    """Write a table as `write_parquet` writes the collisions.
+    """Write a table, exact to the last bit, with the run record in the metadata.
+
+    The metadata of each field has its `unit` and its `meaning`. The file is written whole or not
+    at all.
 
     Args:
         frame: The table.
@@ -80,14 +63,14 @@ def write_table(
 def read_parquet(
     path: str | Path, columns: Sequence[Column] = ()
 ) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """Read a file of `write_parquet`, in a separate process with limits on time and memory.
+    """Read a file of `write_table`, in a separate process with limits on time and memory.
 
     Args:
         path: The file.
         columns: Columns that it must have, among others.
 
     Returns:
-        The collision table and the run record.
+        The table and the run record.
 
     Raises:
         BlastEnvError: If the file is missing, damaged or no Parquet, has no run record, lacks a
@@ -153,7 +136,7 @@ def _check_schema(path: Path, file: pq.ParquetFile, columns: Sequence[Column]) -
     values = file.metadata.num_rows * file.metadata.num_columns
     if values > MOST_VALUES:
         raise BlastEnvError(f"{path}: has {values:,} values, must have at most {MOST_VALUES:,}")
-    known = {each.name: each for each in (*COLLISION_COLUMNS, *columns)}
+    known = {each.name: each for each in columns}
     kinds = {each.name: each.type for each in file.schema_arrow}
     missing = [each.name for each in columns if each.name not in kinds]
     if missing:
