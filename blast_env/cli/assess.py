@@ -55,7 +55,6 @@ from blast_env.evaluation.screening import (
     STAND_OFF_HEADERS,
     THREAT_HEADERS,
     Screening,
-    facades_for,
 )
 from blast_env.evaluation.screening import screen as screen_site
 from blast_env.evaluation.shared import consequences
@@ -151,7 +150,7 @@ def assess(
     """
     if screen and capacity:
         raise BlastEnvError("--screen and --capacity exclude each other")
-    site = facades_for(load_scenario(scenario), glazing, wall)
+    site = load_scenario(scenario).with_facades(glazing, wall)
     required = [Requirement.parsed(each) for each in require or ()]
     layouts: dict[str, Layout] = {"no barrier": ()}
     if layout is not None:

@@ -18,7 +18,6 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.evaluation.answers import titled
-from blast_env.evaluation.screening import facades_for
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 
@@ -139,7 +138,7 @@ def import_map(
     from blast_env.io.importing import import_site
 
     imported = import_site(file, _options(context))
-    imported = replace(imported, scenario=facades_for(imported.scenario, glazing, wall))
+    imported = replace(imported, scenario=imported.scenario.with_facades(glazing, wall))
     save_scenario(imported.scenario, out)
     written = [out, *save_pictures((picture, partial(_plan, imported)))]
     if ledger is not None:

@@ -25,7 +25,7 @@ from blast_env.curves import (
     in_the_open,
     within_curves,
 )
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.standing import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -285,34 +285,6 @@ def stand_offs(
         distances_m = {level: curves.stand_off_m(part, level) for level in _LEVELS}
         found.append(StandOff(name, component, distances_m, curves.least_m))
     return tuple(found)
-
-
-def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Scenario:
-    """Return a scenario whose protected structures without a facade have one.
-
-    Raises:
-        BlastEnvError: If a component is given, but each protected structure has a facade.
-        UnknownNameError: If a component does not exist.
-        ScenarioError: If a structure has no height, or a component does not fit.
-    """
-    facade = {key: name for key, name in (("glazing", glazing), ("wall", wall)) if name}
-    if not facade:
-        return scenario
-    document = scenario.model_dump(mode="json", exclude_none=True)
-    without = [s for s in document["structures"] if s["protected"] and "facade" not in s]
-    if not without:
-        given = " and ".join(f"{key} {name!r}" for key, name in facade.items())
-        raise BlastEnvError(
-            f"{given}: each protected structure of {scenario.name} has a facade already"
-        )
-    known = {**catalogue(), **scenario.components}
-    for kind, name in facade.items():  # here, once for all structures
-        names = [each for each, component in known.items() if component.kind == kind]
-        if name not in names:
-            raise UnknownNameError(kind, name, names)
-    for structure in without:
-        structure["facade"] = facade
-    return Scenario.from_document(document, scenario.name)
 
 
 class _Curves:

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
@@ -331,6 +331,37 @@ class Scenario(Content):
         for group, values in (overrides or {}).items():
             old = simulation["overrides"].get(group, {})
             simulation["overrides"][group] = {**old, **values}
+        return Scenario.from_document(document, self.name)
+
+    def with_facades(self, glazing: str | None, wall: str | None) -> "Scenario":
+        """Return the scenario with a facade on each protected structure that has none.
+
+        Args:
+            glazing: Name of the glazing, if any.
+            wall: Name of the wall, if any.
+
+        Raises:
+            BlastEnvError: If a component is given, but each protected structure has a facade.
+            UnknownNameError: If a component does not exist.
+            ScenarioError: If a structure has no height, or a component does not fit.
+        """
+        facade = {key: name for key, name in (("glazing", glazing), ("wall", wall)) if name}
+        if not facade:
+            return self
+        document = self.model_dump(mode="json", exclude_none=True)
+        without = [s for s in document["structures"] if s["protected"] and "facade" not in s]
+        if not without:
+            given = " and ".join(f"{key} {name!r}" for key, name in facade.items())
+            raise BlastEnvError(
+                f"{given}: each protected structure of {self.name} has a facade already"
+            )
+        known = self._known
+        for kind, name in facade.items():  # here, once for all structures
+            names = [each for each, component in known.items() if component.kind == kind]
+            if name not in names:
+                raise UnknownNameError(kind, name, names)
+        for structure in without:
+            structure["facade"] = facade
         return Scenario.from_document(document, self.name)
 
     @property

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.screening import Screening, facades_for, screen, stand_offs
+from blast_env.evaluation.screening import Screening, screen, stand_offs
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import damage_number, level_of, under_triangle
@@ -133,13 +133,13 @@ def test_masses_by_name_and_by_explosive() -> None:
 def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     with pytest.raises(BlastEnvError, match="--glazing"):
         screen(hut())
-    found = screen(facades_for(hut(), None, "brick_215"), (), [NamedMass("car", 227.0)])
+    found = screen(hut().with_facades(None, "brick_215"), (), [NamedMass("car", 227.0)])
     assert found.present == {"brick_215"}
     assert found.threats[0].name == "car"
     assert found.threats[0].words[2] == "-"
     assert found.threats[0].may_breach
     with pytest.raises(BlastEnvError, match="glazing 'none': each protected structure of hut has"):
-        facades_for(facades_for(hut(), None, "brick_215"), "none", None)
+        hut().with_facades(None, "brick_215").with_facades("none", None)
 
 
 def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> None:
