@@ -30,8 +30,8 @@ from tests.builders import block, point, zone
 from tests.catalogue_sites import item
 from tests.gas_sites import column, net_on_modules
 from tests.io.importing.maps import charge, outline, rectangle, written
-from tests.site.test_driving import LORRY
 from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
+from tests.vehicles.test_driving import LORRY
 
 ENGINE = GasEngine(border_m=0.0)
 

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.response.facade import STOREY_M
+from blast_env.sections import PointM
 from blast_env.site import (
     SCHEMA_VERSION,
     AnySource,
@@ -20,7 +21,6 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.presets import CHARGE_PRESETS
-from blast_env.site.sections import PointM
 from blast_env.site.sources import SegmentSource
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import source_bounds_m

@@ -33,8 +33,8 @@ from blast_env.plots.plan import (
     vehicle_features,
     without,
 )
+from blast_env.sections import PointM
 from blast_env.site import Scenario
-from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # needs the extra `maps`

@@ -20,7 +20,7 @@ from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario
-from blast_env.site.vehicles import source_of
+from blast_env.site.sources import source_of
 
 if TYPE_CHECKING:
     from blast_env.report import StudyOptions

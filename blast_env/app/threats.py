@@ -5,6 +5,7 @@ from math import cbrt
 from typing import Final
 
 from blast_env.evaluation import LoadCase
+from blast_env.sections import PointM
 from blast_env.site import (
     RectangleSource,
     Scenario,
@@ -13,8 +14,7 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.blast_site import Charge
-from blast_env.site.sections import PointM
-from blast_env.site.worst_places import stand_off_m
+from blast_env.vehicles.worst_places import stand_off_m
 
 MOST_USUAL: Final = 4
 """Most sources of charges, without vehicles, that blasts are run with by default."""
@@ -79,7 +79,7 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
         charge = threat.charge
         if isinstance(charge, VehicleCharge):
             return -charge.rank
-        return -stand_off_m(scenario.structures, charge.position_m) / cbrt(charge.tnt_kg)
+        return -stand_off_m(scenario.loaded_walls, charge.position_m) / cbrt(charge.tnt_kg)
 
     chosen = [max(own, key=severity) for own in sources.values()]
     fixed = [each for each in chosen if not isinstance(each.charge, VehicleCharge)]

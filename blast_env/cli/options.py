@@ -18,8 +18,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_of_each_charge
 from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE, Engine
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.sections import PointM
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
-from blast_env.site.sections import PointM
 from blast_env.values import plain_number, printable
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."

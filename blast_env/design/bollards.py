@@ -69,8 +69,8 @@ def posts_and_wall(
     found = find_scenario(scenario)
     posts = _line_on(_ById(found))
     source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
-    place = worst_places(found, source, posts.layout).charge(0)
-    return wall_added_to(posts, place.position_m, NEAR_CHARGE).layout
+    place_m = worst_places(found, source, posts.layout).place_m(0)
+    return wall_added_to(posts, place_m, NEAR_CHARGE).layout
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import Risk
-from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import reductions
+from blast_env.vehicles.worst_places import stand_off_m
 
 if TYPE_CHECKING:  # half a second to import
     from blast_env.design.search.learnt import Guesses
@@ -90,10 +90,10 @@ class PackageProposer:
 
 def _remedy(problem: DesignProblem) -> str:
     """Return the stand-off that would halve the largest impulse, and the way to other help."""
-    structures = problem.scenario.structures
+    walls = problem.scenario.loaded_walls
     charges = [each.charge_against(problem.scenario, ()) for each in problem.threats]
     scale = {each: float(np.cbrt(each.tnt_kg)) for each in charges}
-    now_m = {each: max(stand_off_m(structures, each.position_m), scale[each]) for each in charges}
+    now_m = {each: max(stand_off_m(walls, each.position_m), scale[each]) for each in charges}
     worst = min(charges, key=lambda each: now_m[each] / scale[each])
     further = np.linspace(1.0, 4.0, 301)
     with suppress(BlastEnvError):  # beyond the range of the curves

@@ -17,11 +17,11 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Measure, Rectangle
 from blast_env.layout import LayoutState
+from blast_env.sections import PointM
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, VehicleSource, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Variant
-from blast_env.site.sections import PointM
-from blast_env.site.vehicles import source_of
+from blast_env.site.sources import source_of
 from blast_env.site.zone import source_bounds_m
 from blast_env.sites import Visibility, visibility_layout
 from blast_env.units import MODULE_SIDE_M

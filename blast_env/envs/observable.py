@@ -20,7 +20,7 @@ from blast_env.site import (
     Scenario,
     VehicleSource,
 )
-from blast_env.site.reach import squares_of
+from blast_env.vehicles.reach import squares_of
 
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""

@@ -26,6 +26,7 @@ from blast_env.envs.observable import (
 )
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
+from blast_env.sections import PointM
 from blast_env.site import (
     AnySource,
     Catalogue,
@@ -33,10 +34,9 @@ from blast_env.site import (
     Scenario,
     Site,
 )
-from blast_env.site.reach import squares_of
-from blast_env.site.sections import PointM
 from blast_env.site.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.reach import squares_of
 
 _POINTS_PER_MODULE: Final = 8  # along a line of possible places of a charge
 

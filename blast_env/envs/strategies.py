@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, find_scenario
-from blast_env.site.vehicles import source_of
+from blast_env.site.sources import source_of
 from blast_env.sites import FAMILIES, training_sites
 
 

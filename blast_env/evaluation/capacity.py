@@ -22,7 +22,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import ProgressCallback
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
-from blast_env.site.worst_places import nearest_point_m, stand_off_m
+from blast_env.vehicles.worst_places import nearest_point_m, stand_off_m
 
 RUNGS: Final = 5
 """Number of rungs of a ladder above and below the charge of the scenario."""
@@ -127,7 +127,7 @@ class Ladder:
         if not nearer:
             return self.charge._replace(tnt_kg=self.charge.tnt_kg * severity)
         there = self.charge.position_m
-        x, y = nearest_point_m(self.scenario.structures, there)
+        x, y = nearest_point_m(self.scenario.loaded_walls, there)
         farther = severity ** (-1.0 / 3.0)
         place = (x + farther * (there[0] - x), y + farther * (there[1] - y))
         return self.charge._replace(position_m=place)
@@ -144,7 +144,7 @@ class Ladder:
 
         def edge(severity: float, is_kept: bool = True, is_end: bool = False) -> Edge:
             charge = self.charge_at(severity, nearer)
-            off_m = stand_off_m(self.scenario.structures, charge.position_m)
+            off_m = stand_off_m(self.scenario.loaded_walls, charge.position_m)
             return Edge(charge, off_m, is_kept, is_end)
 
         low = 0

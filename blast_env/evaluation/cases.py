@@ -24,7 +24,7 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import MeanRisk, Risk
-from blast_env.site.vehicles import ranked
+from blast_env.site.sources import ranked
 from blast_env.values import checked_seed, generator
 
 

@@ -29,7 +29,6 @@ from blast_env.layout.build_site import build_site
 from blast_env.provenance import versions
 from blast_env.site import AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
-from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,
@@ -40,6 +39,7 @@ from blast_env.statistics import (
     reductions,
 )
 from blast_env.tables import Column, number_or_none, table_of, table_records
+from blast_env.vehicles.worst_places import stand_off_m
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
@@ -175,8 +175,8 @@ class ThreatOutcome:
         return cls(
             threat=threat,
             charge=charge,
-            stand_off_m=stand_off_m(scenario.structures, charge.position_m),
-            unprotected_stand_off_m=stand_off_m(scenario.structures, elsewhere.position_m),
+            stand_off_m=stand_off_m(scenario.loaded_walls, charge.position_m),
+            unprotected_stand_off_m=stand_off_m(scenario.loaded_walls, elsewhere.position_m),
             impulse_pa_s=loads.protected_impulse_pa_s,
             unprotected_impulse_pa_s=unprotected.protected_impulse_pa_s,
             peak_pa=loads.protected_peak_pa,

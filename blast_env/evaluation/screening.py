@@ -44,10 +44,10 @@ from blast_env.response.facade import (
 from blast_env.response.glass import Pane
 from blast_env.response.requirements import Requirement
 from blast_env.response.walls import Panel
+from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.presets import NamedMass
-from blast_env.site.sections import PointM
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 

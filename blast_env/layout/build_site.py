@@ -15,12 +15,13 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
-from blast_env.site.reach import Reach
+from blast_env.site.obstacles import obstacles_of
 from blast_env.site.structures import AnyStructure, ConcreteSquareSection
 from blast_env.site.terraces import ground_below_m
-from blast_env.site.vehicles import NOTHING, Drive, Obstacles, obstacles_of
-from blast_env.site.worst_places import WorstPlaces
 from blast_env.values import checked_seed
+from blast_env.vehicles.drive import NOTHING, Drive, Obstacles
+from blast_env.vehicles.reach import Reach
+from blast_env.vehicles.worst_places import WorstPlaces
 
 
 def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
@@ -94,7 +95,9 @@ def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCha
         charge: The charge; a `Charge` is returned unchanged.
     """
     if isinstance(charge, VehicleCharge):
-        return worst_places(scenario, charge.source, layout).charge(charge.rank)
+        source = charge.source
+        place_m = worst_places(scenario, source, layout).place_m(charge.rank)
+        return Charge(place_m, source.tnt_kg, source.height_m)
     return charge
 
 

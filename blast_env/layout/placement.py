@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece
-from blast_env.site.access_way import closing_places, is_open
 from blast_env.site.catalogue import Catalogue, PlacedModule, cell_text, element_text
 from blast_env.site.files import AnyScenario, find_scenario
 from blast_env.site.models import Scenario
-from blast_env.site.vehicles import obstacles_of
+from blast_env.site.obstacles import obstacles_of
 from blast_env.site.zone import (
     NO_ZONE,
     BuildZone,
@@ -27,6 +26,7 @@ from blast_env.site.zone import (
     reason_against,
     reasons_against,
 )
+from blast_env.vehicles.access_way import closing_places, is_open
 
 
 class CheckedLayout(tuple[Element, ...]):
@@ -150,7 +150,9 @@ class LayoutState:
         """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""
         obstacles = obstacles_of(self._zone, self.layout, self.scenario.structures)
         return tuple(
-            self.scenario.vehicle_ground(source, self.layout).explain(obstacles)
+            self.scenario.vehicle_ground(source, self.layout).explain(
+                f"the vehicle with {source.tnt_kg:g} kg TNT", obstacles
+            )
             for source in self.scenario.vehicles
         )
 
@@ -338,7 +340,7 @@ class LayoutState:
         if way is None:
             return None
         passable = self._empty_zone.passable & ~self._taken
-        return np.stack([*closing_places(way, passable, self.catalogue.variants)])
+        return np.stack([*closing_places(way, passable, self.catalogue.sizes)])
 
     @property
     def _is_sound(self) -> bool:

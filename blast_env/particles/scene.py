@@ -7,13 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Rectangle
+from blast_env.geometry import TOLERANCE_M, Element, Rectangle
 from blast_env.layout.build_site import build_site, random_streams
 from blast_env.particles.balls import Balls, air_lattice, explosion_fan
 from blast_env.particles.structure import ModularObstacle, obstacle_of
 from blast_env.site import AnyCharge, PointSource, Problem, Scenario, ScenarioError
 from blast_env.site.blast_site import BlastSite, Charge, StructureOutline
-from blast_env.site.boxes import TOLERANCE_M
 from blast_env.site.parameters import SimulationParameters, for_charge
 from blast_env.site.zone import distance_m
 from blast_env.units import UNITS_PER_M, in_units

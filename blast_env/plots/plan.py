@@ -21,6 +21,7 @@ from blast_env.arrays import BoolArray
 from blast_env.geometry import Element, Piece, Rectangle, stacked_runs, standing
 from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
 from blast_env.particles.structure import Colour
+from blast_env.sections import PointM
 from blast_env.site import (
     AnySource,
     AnyStructure,
@@ -31,14 +32,13 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.blast_site import Charge
-from blast_env.site.driving import WayPoint
-from blast_env.site.reach import squares_of
-from blast_env.site.sections import PointM
 from blast_env.site.structures import buildings_of
 from blast_env.site.terraces import ground_below_m, is_open_below, levels_of
-from blast_env.site.vehicles import Impact
-from blast_env.site.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.drive import Impact
+from blast_env.vehicles.driving import WayPoint
+from blast_env.vehicles.reach import squares_of
+from blast_env.vehicles.worst_places import Wall, nearest_point_m
 
 PAGE: Final[Colour] = (255, 255, 255)
 SITE: Final[Colour] = (245, 247, 250)
@@ -651,7 +651,7 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
             area_feature(Kinds.REACHED, each, Kinds.REACHED.words) for each in rectangles_of(ground)
         )
         place_m = worst_places(scenario, source, layout).places_m[0]
-        found.append(stand_off_feature(scenario.structures, place_m))
+        found.append(stand_off_feature(scenario.loaded_walls, place_m))
         said = {"tnt_kg": source.tnt_kg, "above_ground_m": source.height_m}
         words = "worst place of a vehicle"
         found.append(Feature(Kinds.CHARGE, (place_m,), words, said, words))
@@ -659,9 +659,9 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
     return in_order(found)
 
 
-def stand_off_feature(structures: Sequence[AnyStructure], place_m: PointM) -> Feature:
+def stand_off_feature(walls: Sequence[Wall], place_m: PointM) -> Feature:
     """Return the line from a place to the nearest wall that counts, with its length in metres."""
-    wall_m = nearest_point_m(structures, place_m)
+    wall_m = nearest_point_m(walls, place_m)
     length = f"stand-off {np.hypot(*np.subtract(place_m, wall_m)):.1f} m"
     return Feature(Kinds.STAND_OFF, (place_m, wall_m), "stand-off", label=length)
 

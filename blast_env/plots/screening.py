@@ -19,8 +19,8 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import render_extra
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
+from blast_env.sections import PointM
 from blast_env.site import AnyStructure, Scenario
-from blast_env.site.sections import PointM
 
 with render_extra():
     from matplotlib.axes import Axes

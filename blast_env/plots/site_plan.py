@@ -24,8 +24,8 @@ from blast_env.plots.plan import (
     without,
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
+from blast_env.sections import PointM
 from blast_env.site.blast_site import StructureOutline
-from blast_env.site.sections import PointM
 
 with render_extra():
     from matplotlib import patheffects

@@ -76,7 +76,7 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
         charge = threat.charge_against(scenario, layout)
         label = f"{threat.name}: {threat.charge.tnt_kg:g} kg"
         features.append(charge_feature(charge, threat.name, label))
-        features.append(stand_off_feature(scenario.structures, charge.position_m))
+        features.append(stand_off_feature(scenario.loaded_walls, charge.position_m))
     return png(plan_figure(scenario, in_order(features)))
 
 

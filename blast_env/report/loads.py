@@ -15,10 +15,10 @@ from blast_env.evaluation.standing import ReasonedStanding
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, WallName
 from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
-from blast_env.site.blast_site import WALLS, BlastSite, WallName
+from blast_env.site.blast_site import WALLS, BlastSite
 from blast_env.site.structures import buildings_of
 from blast_env.statistics import counted_parts
 

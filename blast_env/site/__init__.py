@@ -2,7 +2,8 @@
 
 from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
-from blast_env.site.access_way import AccessWay
+from blast_env.problems import Problem, ScenarioError
+from blast_env.sections import Site
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
 from blast_env.site.content import SCHEMA_VERSION
@@ -17,18 +18,19 @@ from blast_env.site.files import (
 )
 from blast_env.site.models import Scenario
 from blast_env.site.objective import ObjectiveSection
-from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.sections import GaugeSection, SimulationSection, Site
+from blast_env.site.sections import GaugeSection, SimulationSection
 from blast_env.site.sources import (
+    AnyCharge,
     AnySource,
     PointSource,
     RectangleSource,
     SegmentSource,
+    VehicleCharge,
     VehicleSource,
 )
 from blast_env.site.structures import AnyStructure, ConcreteSquareSection, ModularObstacleSection
-from blast_env.site.vehicles import AnyCharge, VehicleCharge
 from blast_env.site.zone import BuildZone, CostArea, KeepOut
+from blast_env.vehicles.access_way import AccessWay
 
 __all__ = [
     "SCHEMA_VERSION",

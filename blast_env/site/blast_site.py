@@ -5,14 +5,11 @@ from dataclasses import dataclass
 from math import cbrt, hypot
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from blast_env.geometry import Cell, Rectangle, WallLine
+from blast_env.geometry import Cell, Rectangle, WallLine, WallName
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # shapely takes a tenth of a second to import
     from blast_env.site.footprint import Footprint
-
-WallName = Literal["west", "east", "south", "north"]
-"""A wall of a structure, by the side that it faces: west is towards smaller x."""
 
 WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
 

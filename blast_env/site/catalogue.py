@@ -18,13 +18,14 @@ from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
+from blast_env.problems import Problem, ScenarioError, unknown_name
 from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
-from blast_env.site.crash_rating import CrashRating
-from blast_env.site.problems import Problem, ScenarioError, unknown_name
-from blast_env.site.sections import FOR_PEOPLE, Count, Height, Name, Section, SparseSection
+from blast_env.sections import FOR_PEOPLE, Height, Name, Section, SparseSection
+from blast_env.site.sections import Count
 from blast_env.site.structures import FacadePart
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.crash_rating import CrashRating
 
 Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]
 Mass = Annotated[StrictFloat, Field(ge=0.1, le=1e6)]
@@ -337,6 +338,11 @@ class Catalogue:
     ) -> "Catalogue":
         """Return the catalogue of a zone without items: the single module."""
         return cls((Variant(0, "", False, 1, 1, height_m, cost, True),), (), (stock,), shape)
+
+    @property
+    def sizes(self) -> Iterator[tuple[int, int]]:
+        """Rows and columns of cells of each variant; none for measures."""
+        return ((each.rows, each.columns) for each in self.variants)
 
     @property
     def has_items(self) -> bool:

@@ -9,21 +9,18 @@ import numpy as np
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Rectangle, stacked_runs
+from blast_env.geometry import TOLERANCE_M, Rectangle, stacked_runs
+from blast_env.problems import Problem, extent, unknown_name
+from blast_env.sections import Ground, PointM, Site
 from blast_env.site.blast_site import BARRIER_NAME
-from blast_env.site.boxes import TOLERANCE_M
 from blast_env.site.content import Content
-from blast_env.site.driving import places_shape
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
 from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or_below
 from blast_env.site.parameters import AirParameters, for_charge
-from blast_env.site.problems import Problem, extent, unknown_name
-from blast_env.site.reach import places_on
-from blast_env.site.sections import MOST_MODULES, GaugeSection, Ground, PointM, Site
+from blast_env.site.sections import MOST_MODULES, GaugeSection
 from blast_env.site.sources import PlaceSource, VehicleSource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import terrace_problems
-from blast_env.site.vehicles import MOST_PLACES, Obstacles, VehicleGround
 from blast_env.site.zone import (
     BuildZone,
     EmptyZone,
@@ -33,6 +30,10 @@ from blast_env.site.zone import (
 )
 from blast_env.site.zone_checks import build_zone_problems, place_count_problems
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.drive import MOST_PLACES, Obstacles, VehicleGround
+from blast_env.vehicles.driving import places_shape
+from blast_env.vehicles.reach import places_on
+from blast_env.vehicles.vehicle import Vehicle
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
@@ -300,7 +301,7 @@ def _way_problems(scenario: Content, key: str, ground: VehicleGround) -> Iterato
             f" entry a gap of {width}"
         )
         yield Problem(f"{key}.entries", message)
-    elif any(each.protected for each in ground.structures):
+    elif ground.walls:
         stand_off_m = ground.worst_places().stand_off_m
         if stand_off_m >= ground.entry_stand_off_m - TOLERANCE_M:
             message = (
@@ -336,7 +337,7 @@ def _stopping_problems(
         yield Problem(key, message)
 
 
-def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
+def _stopping_cells(empty: EmptyZone, source: Vehicle) -> BoolArray:
     """Return the cells that an item which stops the vehicle can cover (rows, columns)."""
     cells = np.zeros_like(empty.usable)
     rows, columns = cells.shape

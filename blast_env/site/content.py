@@ -7,22 +7,16 @@ from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.geometry import Element, Rectangle
 from blast_env.response.components import Component
+from blast_env.sections import FOR_PEOPLE, Name, Section, Site
 from blast_env.site.heights import default_air_height_m
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.parameters import SimulationParameters
-from blast_env.site.sections import (
-    FOR_PEOPLE,
-    AnyGeoreference,
-    GaugeSection,
-    Name,
-    Section,
-    SimulationSection,
-    Site,
-)
+from blast_env.site.sections import AnyGeoreference, GaugeSection, SimulationSection
 from blast_env.site.sources import AnySource, VehicleSource
-from blast_env.site.structures import AnyStructure
-from blast_env.site.vehicles import RatedPiece, VehicleGround
+from blast_env.site.structures import AnyStructure, loaded_walls
 from blast_env.site.zone import BuildZone, Surroundings
+from blast_env.vehicles.drive import RatedPiece, VehicleGround
+from blast_env.vehicles.worst_places import Wall
 
 SCHEMA_VERSION: Final = 2
 """The version of the file format."""
@@ -97,6 +91,11 @@ class Content(Section):
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
         return tuple(each for each in self.structures if each.name not in away)
 
+    @property
+    def loaded_walls(self) -> tuple[Wall, ...]:
+        """The walls of protected structures whose load counts."""
+        return loaded_walls(self.structures)
+
     def vehicle_ground(
         self, source: VehicleSource, layout: Iterable[Element] = ()
     ) -> VehicleGround:
@@ -111,4 +110,13 @@ class Content(Section):
             else:
                 rated = (RatedPiece(where, rating, "the gate"),)
         structures = self.structures_with(layout)
-        return VehicleGround(source, self.site, structures, closed, rated, self.charge_radius_m)
+        standing_m = tuple(box for s in structures if not s.lets_through for box in s.boxes_m)
+        return VehicleGround(
+            source,
+            self.site,
+            standing_m,
+            loaded_walls(structures),
+            closed,
+            rated,
+            self.charge_radius_m,
+        )

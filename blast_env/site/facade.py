@@ -24,11 +24,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from blast_env.errors import BlastEnvError
+from blast_env.problems import Problem, unknown_name
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import Bay, FilledBay, bays_in, divide
 from blast_env.site.catalogue import Hardening
-from blast_env.site.problems import Problem, unknown_name
 from blast_env.site.structures import AnyStructure, FacadeSection
 
 MOST_BAYS: Final = 5_000

@@ -11,8 +11,8 @@ from blast_env.bundled import SCENARIO_SUFFIX, bundled_scenarios, scenario_folde
 from blast_env.documents import DocumentError, parse_toml, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_text
+from blast_env.problems import Problem, ScenarioError, unknown_name
 from blast_env.site.models import Scenario
-from blast_env.site.problems import Problem, ScenarioError, unknown_name
 from blast_env.values import path_of
 
 SUFFIX: Final = SCENARIO_SUFFIX

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.site.access_way import any_in_windows, counts_before
+from blast_env.arrays import any_in_windows, counts_before
 from blast_env.site.blast_site import WALLS
 from blast_env.site.sections import GaugeSection
 from blast_env.site.sources import AnySource

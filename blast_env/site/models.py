@@ -20,6 +20,7 @@ from pydantic import (
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
+from blast_env.problems import Problem, ScenarioError, problems_from
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
@@ -29,10 +30,15 @@ from blast_env.site.checks import check_sections, check_sources, particle_proble
 from blast_env.site.content import Content, Sources
 from blast_env.site.facade import NamedBay, named_bays
 from blast_env.site.heights import default_air_height_m, height_notes
-from blast_env.site.problems import Problem, ScenarioError, problems_from
-from blast_env.site.sources import AnySource, PointSource, VehicleSource
+from blast_env.site.sources import (
+    AnyCharge,
+    AnySource,
+    PointSource,
+    VehicleCharge,
+    VehicleSource,
+    ranked,
+)
 from blast_env.site.structures import PolygonSection
-from blast_env.site.vehicles import AnyCharge, VehicleCharge, ranked
 from blast_env.site.zone import (
     BuildZone,
 )

@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.arrays import FloatArray
+from blast_env.problems import Problem, ScenarioError
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from
-from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.sections import Section
+from blast_env.sections import Section
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level, conditional_value_at_risk
 from blast_env.units import PA_PER_PSI
 

@@ -12,25 +12,18 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.geometry import Cell, Rectangle
-from blast_env.response.components import PaneSide
-from blast_env.response.facade import BAY_M, STOREY_M, Bay
-from blast_env.site.blast_site import WALLS, WallName
-from blast_env.site.problems import (
+from blast_env.geometry import Cell, Rectangle, WallName
+from blast_env.problems import (
     Problem,
     ScenarioError,
 )
-from blast_env.site.sections import (
-    FOR_PEOPLE,
-    MOST_MODULES,
-    Coordinate,
-    Count,
-    Height,
-    Name,
-    PointM,
-    Section,
-)
+from blast_env.response.components import PaneSide
+from blast_env.response.facade import BAY_M, STOREY_M, Bay
+from blast_env.sections import FOR_PEOPLE, Coordinate, Height, Name, PointM, Section
+from blast_env.site.blast_site import WALLS
+from blast_env.site.sections import MOST_MODULES, Count
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.worst_places import Wall
 
 if TYPE_CHECKING:  # shapely takes a tenth of a second to import
     from blast_env.site.footprint import Footprint
@@ -332,6 +325,25 @@ class PolygonSection(StructureSection):
 AnyStructure = Annotated[
     ModularObstacleSection | ConcreteSquareSection | PolygonSection, Field(discriminator="kind")
 ]
+
+
+def loaded_walls(structures: Iterable[AnyStructure]) -> tuple[Wall, ...]:
+    """Return the walls of protected structures that their `faces` name."""
+    return tuple(wall for each in structures if each.protected for wall in _faces_of(each))
+
+
+def _faces_of(structure: AnyStructure) -> Iterator[Wall]:
+    if structure.footprint is not None:
+        yield from (wall for wall in structure.footprint.walls if wall.side in structure.faces)
+        return
+    left, bottom, right, top = structure.rectangle_m
+    sides: dict[WallName, Rectangle] = {
+        "west": Rectangle(left, bottom, left, top),
+        "east": Rectangle(right, bottom, right, top),
+        "south": Rectangle(left, bottom, right, bottom),
+        "north": Rectangle(left, top, right, top),
+    }
+    yield from (sides[wall] for wall in structure.faces)
 
 
 def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStructure]]:

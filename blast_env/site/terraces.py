@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Rectangle, stacked_runs
-from blast_env.site.boxes import TOLERANCE_M, Boxes, covered_m2, overlapping
-from blast_env.site.problems import Problem
+from blast_env.geometry import TOLERANCE_M, Boxes, Rectangle, covered_m2, overlapping, stacked_runs
+from blast_env.problems import Problem
 from blast_env.site.structures import AnyStructure
 
 

@@ -15,17 +15,21 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
-from blast_env.response.barriers import RigidPiece
-from blast_env.site.access_way import AccessWay, any_in_windows, counts_before
-from blast_env.site.boxes import (
+from blast_env.arrays import BoolArray, FloatArray, any_in_windows, counts_before
+from blast_env.geometry import (
     TOLERANCE_M,
     Boxes,
+    Cell,
+    Element,
+    Piece,
+    Rectangle,
+    Removal,
     box_distances_m,
     overlapping,
     overlapping_any,
 )
+from blast_env.response.barriers import RigidPiece
+from blast_env.sections import FOR_PEOPLE, Area, Height, PointM, Section, Site, SparseSection
 from blast_env.site.catalogue import (
     MOST_ITEMS,
     AnyMeasure,
@@ -37,20 +41,12 @@ from blast_env.site.catalogue import (
     PlacedModule,
     Variant,
 )
-from blast_env.site.sections import (
-    FOR_PEOPLE,
-    Area,
-    Count,
-    Height,
-    PointM,
-    Section,
-    Site,
-    SparseSection,
-)
+from blast_env.site.sections import Count
 from blast_env.site.sources import AnySource, PointSource, RectangleSource, VehicleSource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_m, lie_wholly_on
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.access_way import AccessWay
 
 BUDGET_TOLERANCE: Final = 1e-9
 """Share of the budget by which rounding may exceed it."""

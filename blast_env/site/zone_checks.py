@@ -6,11 +6,9 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Rectangle
-from blast_env.site.access_way import AccessWay, closing_places, is_open
-from blast_env.site.boxes import TOLERANCE_M
-from blast_env.site.problems import Problem, extent
-from blast_env.site.sections import Area
+from blast_env.geometry import TOLERANCE_M, Rectangle
+from blast_env.problems import Problem, extent
+from blast_env.sections import Area
 from blast_env.site.zone import (
     BuildZone,
     EmptyZone,
@@ -18,6 +16,7 @@ from blast_env.site.zone import (
     empty_zone,
 )
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.access_way import AccessWay, closing_places, is_open
 
 MOST_PLACES: Final = 10_000_000
 """Most places: cells times variants, each of which takes some ten bytes."""
@@ -148,7 +147,7 @@ def _closing(zone: BuildZone, way: AccessWay, cells: EmptyZone) -> BoolArray:
     """Return whether each variant alone would close the way; none if the way is too wide."""
     if way.width_cells > min(zone.shape):
         return np.zeros_like(cells.fits)
-    return np.stack([*closing_places(way, cells.passable, cells.catalogue.variants)])
+    return np.stack([*closing_places(way, cells.passable, cells.catalogue.sizes)])
 
 
 def _access_way_problem(

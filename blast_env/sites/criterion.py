@@ -14,6 +14,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Layout, Rectangle
 from blast_env.layout import LayoutState, usable_cells
+from blast_env.sections import PointM
 from blast_env.site import (
     AnyScenario,
     AnySource,
@@ -24,7 +25,6 @@ from blast_env.site import (
     Scenario,
     find_scenario,
 )
-from blast_env.site.sections import PointM
 from blast_env.site.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
 

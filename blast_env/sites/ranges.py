@@ -8,14 +8,14 @@ from typing import Annotated, Any, ClassVar, Final, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, Field, StrictFloat, StrictInt, ValidationError
 
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, box_distances_m
+from blast_env.problems import problems_from
+from blast_env.sections import Name, Section
 from blast_env.site import Problem, ScenarioError
-from blast_env.site.access_way import WholeModules
-from blast_env.site.boxes import box_distances_m
-from blast_env.site.problems import problems_from
-from blast_env.site.sections import Name, PresetName, Section
+from blast_env.site.sections import PresetName
 from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.access_way import WholeModules
 
 Span = tuple[float, float]
 """Lowest and highest value, both possible."""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from blast_env.geometry import WallName
+from blast_env.sections import PointM
 from blast_env.site import AnyScenario, Scenario, find_scenario
-from blast_env.site.blast_site import WallName
-from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
 _DIGITS: Final = 9

@@ -15,7 +15,8 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
-from blast_env.layout.build_site import vehicle_reach, worst_places
+from blast_env.layout.build_site import charge_against, vehicle_reach, worst_places
+from blast_env.site import VehicleCharge
 from tests.catalogue_sites import ITEMS, WALL, item, yard
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
 
@@ -157,8 +158,7 @@ def test_the_charges_are_where_the_layout_let_the_vehicle_come(
     finished: tuple[float, dict[str, Any]],
 ) -> None:
     _, info = finished
-    worst = worst_places(SITE, SOURCE, POSTS)
-    expected = tuple(worst.charge(rank) for rank in range(3))
+    expected = tuple(charge_against(SITE, POSTS, VehicleCharge(SOURCE, rank)) for rank in range(3))
     assert info["charges"] == expected
     assert expected[2] == expected[0]
     assert info["reduction"] > 0.4
@@ -176,7 +176,8 @@ def test_pieces_stop_the_vehicle_as_what_they_are() -> None:
     *_, info = barrier.step(site.zone.catalogue.finish)
     worst = worst_places(site, vehicle_of(site), info["layout"])
     assert info["layout"] == layout
-    assert info["charges"] == (worst.charge(0),)
+    vehicle = VehicleCharge(vehicle_of(site))
+    assert info["charges"] == (charge_against(site, layout, vehicle),)
     assert worst.stand_off_m == pytest.approx(worst_places(site, vehicle_of(site)).stand_off_m)
 
 

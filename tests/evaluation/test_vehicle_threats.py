@@ -16,7 +16,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import search_set
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.layout.build_site import build_site, worst_places
+from blast_env.layout.build_site import build_site, charge_against, worst_places
 from blast_env.site import VehicleCharge
 from blast_env.site.blast_site import Charge
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
@@ -72,13 +72,13 @@ def test_particles_judge_a_vehicle_too() -> None:
     threat = LoadCase(VehicleCharge(SOURCE), 3)
     evaluator = BlastEvaluator(SITE, "event")
     load = evaluator.loads(POSTS, threat).protected_impulse_sim
-    place = worst_places(SITE, SOURCE, POSTS).charge(0)
+    place = charge_against(SITE, POSTS, VehicleCharge(SOURCE))
     assert load == simulate(SITE, POSTS, 3, "event", place).impulse_sim("hut")
 
 
 def test_a_blast_without_a_charge_given_has_the_vehicle_at_its_worst_place() -> None:
     for layout in ((), POSTS):
-        expected = worst_places(SITE, SOURCE, layout).charge(0)
+        expected = charge_against(SITE, layout, VehicleCharge(SOURCE))
         assert build_site(SITE, layout, seed=4).charge == expected
 
 

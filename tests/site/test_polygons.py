@@ -26,8 +26,8 @@ from blast_env.plots.plan import Kinds, site_features
 from blast_env.plots.site_picture import site_picture
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.blast_site import Charge
-from blast_env.site.worst_places import stand_off_m
 from blast_env.sites.turning import turned
+from blast_env.vehicles.worst_places import stand_off_m
 from tests.builders import block
 from tests.gas_sites import site_document
 from tests.vehicle_sites import gate_site, vehicle_of
@@ -113,7 +113,7 @@ def test_a_vehicle_reaches_the_wall_itself() -> None:
     places = worst_places(scenario, source)
     assert vehicle_reach(scenario, source).enters
     assert places.stand_off_m == pytest.approx(1.0, abs=0.45)
-    assert stand_off_m(scenario.structures, (10.0, 1.0)) == pytest.approx(3.0 * 6.0 / 45**0.5)
+    assert stand_off_m(scenario.loaded_walls, (10.0, 1.0)) == pytest.approx(3.0 * 6.0 / 45**0.5)
 
 
 def test_particles_hit_its_modules() -> None:

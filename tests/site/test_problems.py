@@ -3,8 +3,8 @@ import pickle
 import pytest
 from pydantic import ValidationError
 
+from blast_env.problems import MAX_PROBLEMS
 from blast_env.site import Problem, Scenario, ScenarioError
-from blast_env.site.problems import MAX_PROBLEMS
 from tests.site.documents import (
     KeyPath,
     changed,

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.geometry import Rectangle
-from blast_env.site.boxes import box_distances_m
+from blast_env.geometry import Rectangle, box_distances_m
 from blast_env.sites.ranges import Draws, SpacedObstacle, draw_place
 
 AREA = Rectangle(1.0, 2.0, 9.0, 8.0)

@@ -35,7 +35,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
-from blast_env.site.vehicles import source_of
+from blast_env.site.sources import source_of
 
 Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy

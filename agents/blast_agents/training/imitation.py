@@ -29,7 +29,7 @@ from blast_env.evaluation import Evaluators, LoadCaseSet
 from blast_env.evaluation.evaluator import run_together
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
-from blast_env.site.vehicles import source_of
+from blast_env.site.sources import source_of
 from blast_env.statistics import reductions
 
 _LOADS: Final = 50_000

@@ -17,8 +17,8 @@ from blast_env.io.export.bill import MODULE, LayoutPlan, stock_of
 from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
+from blast_env.sections import PointM
 from blast_env.site import BuildZone
-from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import letters
 

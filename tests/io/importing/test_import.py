@@ -16,8 +16,9 @@ from blast_env.io.importing import ImportedSite, ImportOptions, import_site
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.things import Role
 from blast_env.layout import usable_cells
+from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, load_scenario, save_scenario
-from blast_env.site.sections import DrawingGeoreference, MapGeoreference, PointM
+from blast_env.site.sections import DrawingGeoreference, MapGeoreference
 from blast_env.site.structures import PolygonSection
 from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.site import AccessWay
-from blast_env.site.access_way import closing_places, is_open
 from blast_env.site.catalogue import Catalogue
+from blast_env.vehicles.access_way import closing_places, is_open
 from tests.site.zones import can_cross
 
 
@@ -18,7 +18,7 @@ def way(width_cells: int, between: str = "left_right") -> AccessWay:
 def closing_cells(way: AccessWay, passable: np.ndarray) -> np.ndarray:
     """The cells on which a single module leaves no way."""
     shape = (passable.shape[0], passable.shape[1])
-    (closing,) = closing_places(way, passable, Catalogue.of_modules(1, None, 1.0, shape).variants)
+    (closing,) = closing_places(way, passable, Catalogue.of_modules(1, None, 1.0, shape).sizes)
     return closing
 
 

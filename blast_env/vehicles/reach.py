@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.site.sections import Site
+from blast_env.sections import Site
 from blast_env.units import MODULE_SIDE_M
 
 _PER_M: Final = 1_000_000

@@ -13,12 +13,13 @@ from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import charge_against, vehicle_reach, worst_places
+from blast_env.sections import Site
 from blast_env.site import AnyCharge, VehicleCharge
 from blast_env.site.blast_site import Charge
-from blast_env.site.reach import Reach
-from blast_env.site.sections import Site
-from blast_env.site.sources import Entry, VehicleSource
-from blast_env.site.vehicles import Obstacles, VehicleGround, ranked
+from blast_env.site.sources import VehicleSource, ranked
+from blast_env.vehicles.drive import Obstacles, VehicleGround
+from blast_env.vehicles.reach import Reach
+from blast_env.vehicles.vehicle import Entry
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 
 SIDE = 12
@@ -36,7 +37,7 @@ def ground(width_m: float, side_m: float = 0.5 * SIDE) -> VehicleGround:
     source = VehicleSource.model_validate(
         vehicle_document(width_m=width_m, entries=[{"start_m": [0.0, 0.0], "end_m": [0.0, side_m]}])
     )
-    return VehicleGround(source, Site(width_m=side_m, height_m=side_m), ())
+    return VehicleGround(source, Site(width_m=side_m, height_m=side_m))
 
 
 def step_by_step(

@@ -13,9 +13,9 @@ from typing import Annotated, Any, Final
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.errors import value_text
-from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.sections import FOR_PEOPLE, Section
-from blast_env.site.sources import Speed, VehicleMass
+from blast_env.problems import Problem, ScenarioError
+from blast_env.sections import FOR_PEOPLE, Section
+from blast_env.vehicles.vehicle import Speed, VehicleMass
 
 _ASTM_KG: Final[Mapping[str, float]] = MappingProxyType(
     {"C": 1100.0, "FS": 2100.0, "PU": 2300.0, "P": 2300.0, "M": 6800.0, "C7": 7200.0, "H": 29500.0}

@@ -12,12 +12,13 @@ from blast_env.design.bollards import line_of_posts
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import vehicle_drive, worst_places
+from blast_env.sections import Site
 from blast_env.site import Scenario, ScenarioError
-from blast_env.site.crash_rating import CrashRating
-from blast_env.site.driving import KM_H_PER_M_S, STEP_M, SpeedField
-from blast_env.site.sections import Site
 from blast_env.site.sources import VehicleSource
-from blast_env.site.vehicles import Obstacles, RatedPiece, VehicleGround
+from blast_env.site.structures import loaded_walls
+from blast_env.vehicles.crash_rating import CrashRating
+from blast_env.vehicles.drive import Obstacles, RatedPiece, VehicleGround
+from blast_env.vehicles.driving import KM_H_PER_M_S, STEP_M, SpeedField
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 
 LORRY: dict[str, Any] = {
@@ -48,7 +49,7 @@ def ground(
         motion=LORRY | motion,
     )
     source = VehicleSource.model_validate(document)
-    return VehicleGround(source, Site(width_m=width_m, height_m=height_m), ())
+    return VehicleGround(source, Site(width_m=width_m, height_m=height_m))
 
 
 def speeds_of(ground: VehicleGround, obstacles: Obstacles | None = None) -> SpeedField:
@@ -392,7 +393,7 @@ def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
     """On a straight road, and where the last of the way is one long arc."""
     yard = ground(60.0, 40.0, (2.0, 12.0), [], entry_speed_km_h=40.0)
     hut = gate_site().structures[0].model_copy(update={"corner_m": (56.0, 24.0)})
-    site = VehicleGround(yard.source, yard.site, (hut,))
+    site = VehicleGround(yard.source, yard.site, hut.boxes_m, loaded_walls([hut]))
     fences = tuple(
         RatedPiece(
             Rectangle(x, 0.0, x + 0.5, 40.0), CrashRating(mass_kg=3500.0, speed_km_h=32.0), n
@@ -401,5 +402,5 @@ def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
     )
     way, through = site.drive(Obstacles(rated=fences)).weakest_way
     assert [each.piece.name for each in through] == ["first", "second", "third"]
-    assert "first" in site.explain(Obstacles(rated=fences))
+    assert "first" in site.explain("a lorry", Obstacles(rated=fences))
     assert way[-1].place_m[0] > 46.0

@@ -1,13 +1,13 @@
 """Compiled search over the steps of a driving vehicle, imported on first use.
 
-Lengths and labels are those of `blast_env.site.driving_steps`.
+Lengths and labels are those of `blast_env.vehicles.driving_steps`.
 """
 
 import numpy as np
 from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.site.driving_steps import NEVER, IntArray32, Labels
+from blast_env.vehicles.driving_steps import NEVER, IntArray32, Labels
 
 
 @njit(cache=True)

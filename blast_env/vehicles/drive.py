@@ -4,10 +4,10 @@ A vehicle is a square of ground, `width_m` on a side, with sides parallel to tho
 the border it moves in any direction without rotation, and never covers a structure, closed ground,
 a gate, or an obstacle that stops it. Touching is allowed: it fits through a gap of exactly its
 width, but not through one that is 1 micrometre narrower, nor diagonally between two touching
-obstacles (`blast_env.site.reach`).
+obstacles (`blast_env.vehicles.reach`).
 
 A vehicle with a motion breaks through pieces whose crash rating does not cover its mass, or its
-impact speed (`blast_env.site.driving`), and drives on without loss of speed. Broken pieces open
+impact speed (`blast_env.vehicles.driving`), and drives on without loss of speed. Broken pieces open
 ways to others and longer run-ups, so the search repeats until no further piece breaks.
 """
 
@@ -22,83 +22,20 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Element, Rectangle, stacked_runs, standing
-from blast_env.site.blast_site import Charge, WallName
-from blast_env.site.catalogue import element_text
-from blast_env.site.crash_rating import CrashRating
-from blast_env.site.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
-from blast_env.site.reach import Reach, ReachQuery, steps_of
-from blast_env.site.sections import PointM, Site
-from blast_env.site.sources import AnySource, Entry, PointSource, VehicleSource
-from blast_env.site.structures import AnyStructure
-from blast_env.site.terraces import ground_below_m
-from blast_env.site.worst_places import WorstPlaces, least_distances_m, worst_of
-from blast_env.site.zone import BuildZone
+from blast_env.geometry import Rectangle, WallName, stacked_runs
+from blast_env.sections import PointM, Site
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.crash_rating import CrashRating
+from blast_env.vehicles.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
+from blast_env.vehicles.reach import Reach, ReachQuery, steps_of
+from blast_env.vehicles.vehicle import Entry, Vehicle
+from blast_env.vehicles.worst_places import Wall, WorstPlaces, least_distances_m, worst_of
 
 _SAME_M: Final = 1e-9
 """Tolerance within which edges are equal, as in `Rectangle.contains`."""
 
 MOST_PLACES: Final = 3_000_000
 """Most places of the charges of all vehicles: three vehicles on the largest site."""
-
-
-@dataclass(frozen=True)
-class VehicleCharge:
-    """The charge of a vehicle without a layout; see `WorstPlaces.charge`.
-
-    Attributes:
-        source: The vehicle.
-        rank: Rank of its place among the worst places, from 0.
-    """
-
-    source: VehicleSource
-    rank: int = 0
-
-    @property
-    def tnt_kg(self) -> float:
-        """TNT-equivalent mass."""
-        return self.source.tnt_kg
-
-    @property
-    def height_m(self) -> float:
-        """Height of the charge's centre above the ground."""
-        return self.source.height_m
-
-    def with_charge(
-        self, tnt_kg: float | None = None, height_m: float | None = None
-    ) -> "VehicleCharge":
-        """Return a copy with another mass, kg, or height, m; bounds are not checked."""
-        changes = {"tnt_kg": tnt_kg, "height_m": height_m}
-        given = {key: value for key, value in changes.items() if value is not None}
-        return VehicleCharge(self.source.model_copy(update=given), self.rank)
-
-
-AnyCharge = Charge | VehicleCharge
-"""A charge at a place, or one in a vehicle, with a place that depends on the layout."""
-
-
-def source_of(charge: AnyCharge) -> AnySource:
-    """Return the source of a single charge: a point, or the vehicle.
-
-    Raises:
-        ValidationError: If the charge is out of bounds.
-    """
-    return charge.source if isinstance(charge, VehicleCharge) else PointSource.at(charge)
-
-
-def ranked(charges: Iterable[AnyCharge]) -> tuple[AnyCharge, ...]:
-    """Return charges with rising ranks for those of each vehicle."""
-    met: dict[VehicleSource, int] = {}
-    result: list[AnyCharge] = []
-    for charge in charges:
-        if isinstance(charge, VehicleCharge):
-            rank = met.get(charge.source, 0)
-            met[charge.source] = rank + 1
-            result.append(VehicleCharge(charge.source, rank))
-        else:
-            result.append(charge)
-    return tuple(result)
 
 
 class RatedPiece(NamedTuple):
@@ -133,32 +70,6 @@ NOTHING: Final = Obstacles()
 """The empty site."""
 
 
-def obstacles_of(
-    zone: BuildZone, layout: Iterable[Element], structures: Sequence[AnyStructure]
-) -> Obstacles:
-    """Return the obstacles of a layout.
-
-    Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
-    terrace are out of reach, and no obstacles.
-
-    Raises:
-        LayoutError: If there is no such item, or it cannot be turned.
-    """
-    terraces = [each for each in structures if each.carries]
-    stops: list[Rectangle] = []
-    solid: list[Rectangle] = []
-    rated: list[RatedPiece] = []
-    for element in sorted(standing(layout)):
-        variant, rectangle = zone.catalogue.variant(element), zone.element_rectangle_m(element)
-        if ground_below_m(terraces, rectangle) > 0.0:
-            continue
-        if variant.crash_rating is not None:
-            rated.append(RatedPiece(rectangle, variant.crash_rating, element_text(element)))
-        else:
-            (stops if variant.stops_vehicles else solid).append(rectangle)
-    return Obstacles(tuple(stops), tuple(solid), tuple(rated))
-
-
 @dataclass(frozen=True)
 class VehicleGround:
     """A vehicle with its surroundings on the empty site.
@@ -166,15 +77,17 @@ class VehicleGround:
     Attributes:
         source: The vehicle.
         site: The site.
-        structures: The structures.
+        standing_m: The rectangles of the structures that it cannot pass below.
+        walls: The loaded walls of the protected structures.
         gates: Gates that stop it at any speed.
         rated_gates: Gates with a crash rating.
         charge_radius_m: Radius of the charge's disc.
     """
 
-    source: VehicleSource
+    source: Vehicle
     site: Site
-    structures: tuple[AnyStructure, ...]
+    standing_m: tuple[Rectangle, ...] = ()
+    walls: tuple[Wall, ...] = ()
     gates: tuple[Rectangle, ...] = ()
     rated_gates: tuple[RatedPiece, ...] = ()
     charge_radius_m: float = MODULE_SIDE_M
@@ -193,13 +106,6 @@ class VehicleGround:
     def closed_m(self) -> tuple[Rectangle, ...]:
         """All closed rectangles, including gates with a crash rating."""
         return (*self.always_closed_m, *(gate.rectangle for gate in self.rated_gates))
-
-    @cached_property
-    def standing_m(self) -> tuple[Rectangle, ...]:
-        """The structures that it cannot pass below."""
-        return tuple(
-            box for each in self.structures if not each.lets_through for box in each.boxes_m
-        )
 
     @cached_property
     def always_closed_m(self) -> tuple[Rectangle, ...]:
@@ -225,11 +131,10 @@ class VehicleGround:
         """Return the worst places of its charge against obstacles, cached."""
         return _worst_places(self, obstacles)
 
-    def explain(self, obstacles: Obstacles = NOTHING) -> str:
-        """Return a sentence with the vehicle's stand-off, way and speeds."""
+    def explain(self, name: str, obstacles: Obstacles = NOTHING) -> str:
+        """Return a sentence with the vehicle's stand-off, way and speeds, under a name."""
         worst, source = self.worst_places(obstacles), self.source
         x_m, y_m = worst.places_m[0]
-        name = f"the vehicle with {source.tnt_kg:g} kg TNT"
         text = f"{name} comes as near as {worst.stand_off_m:.1f} m"
         if source.motion is None:
             stopped = "no speed is given: whatever stops vehicles stops it"
@@ -248,7 +153,7 @@ class VehicleGround:
     @property
     def entry_stand_off_m(self) -> float:
         """Least distance of its centre, just after entry, from a loaded wall, m."""
-        return float(least_distances_m(self.structures, self.reach().starts_m).min())
+        return float(least_distances_m(self.walls, self.reach().starts_m).min())
 
 
 class Impact(NamedTuple):
@@ -309,7 +214,7 @@ class Drive:
         """
         if not len(self.places_m):
             raise ValueError("the vehicle cannot enter, so its charge goes off nowhere")
-        return worst_of(self.ground.source, self.places_m, self.ground.structures)
+        return worst_of(self.ground.source, self.places_m, self.ground.walls)
 
     @cached_property
     def weakest_way(self) -> tuple[tuple[WayPoint, ...], tuple[Impact, ...]]:

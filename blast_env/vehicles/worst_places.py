@@ -1,9 +1,9 @@
 """The worst places of a vehicle's charge: those nearest to a loaded wall of a protected structure.
 
-A loaded wall is one of the structure's `faces`, whose load counts.
+A loaded wall is one of a structure's `faces`, whose load counts.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Final
@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle, WallLine
-from blast_env.site.blast_site import Charge, WallName
-from blast_env.site.boxes import box_distances_m
-from blast_env.site.sections import PointM
-from blast_env.site.sources import VehicleSource
-from blast_env.site.structures import AnyStructure
+from blast_env.geometry import Rectangle, WallLine, box_distances_m
+from blast_env.sections import PointM
+from blast_env.vehicles.vehicle import Vehicle
+
+Wall = Rectangle | WallLine
+"""A wall in plan; that of a rectangular structure is a rectangle of width 0."""
 
 _EQUAL_M: Final = 1e-6
 """Tolerance within which distances are equal."""
@@ -27,17 +27,17 @@ class WorstPlaces:
     """The worst places of a vehicle's charge, in order.
 
     The first is the place nearest to a loaded wall; each further one is the nearest of those at
-    least `VehicleSource.least_apart_m` from all before it. Since the charge is the same everywhere,
+    least `Vehicle.least_apart_m` from all before it. Since the charge is the same everywhere,
     this is also the order of scaled distances. Among equally near places the one nearest to the
     middle of its wall comes first, then the leftmost, then the lowest.
 
     Attributes:
         source: The vehicle.
-        places_m: The places, at least one and at most `VehicleSource.places`.
+        places_m: The places, at least one and at most `Vehicle.places`.
         distances_m: Distance of each place from the nearest loaded wall.
     """
 
-    source: VehicleSource
+    source: Vehicle
     places_m: tuple[PointM, ...]
     distances_m: tuple[float, ...]
 
@@ -46,29 +46,26 @@ class WorstPlaces:
         """Least distance of the vehicle's centre from a loaded wall."""
         return self.distances_m[0]
 
-    def charge(self, rank: int) -> Charge:
-        """Return the charge at a place by rank from 0; ranks wrap around at the last place."""
-        place_m = self.places_m[rank % len(self.places_m)]
-        return Charge(place_m, self.source.tnt_kg, self.source.height_m)
+    def place_m(self, rank: int) -> PointM:
+        """Return a place by its rank, from 0; ranks wrap around at the last place."""
+        return self.places_m[rank % len(self.places_m)]
 
 
-def worst_of(
-    source: VehicleSource, places_m: FloatArray, structures: Sequence[AnyStructure]
-) -> WorstPlaces:
+def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> WorstPlaces:
     """Return the worst of some places.
 
     Args:
         source: The vehicle.
         places_m: Possible places of its charge, at least one (places, 2).
-        structures: The structures.
+        walls: The loaded walls of protected structures.
     """
-    stand_offs_m = least_distances_m(structures, places_m)
+    stand_offs_m = least_distances_m(walls, places_m)
     left = np.ones(len(places_m), dtype=bool)
     chosen: list[PointM] = []
     distances_m: list[float] = []
     while left.any() and len(chosen) < source.places:
         near = np.flatnonzero(left & (stand_offs_m <= stand_offs_m[left].min() + _EQUAL_M))
-        middle_m = _from_middle_m(structures, places_m[near], stand_offs_m[near])
+        middle_m = _from_middle_m(walls, places_m[near], stand_offs_m[near])
         best = np.arange(len(near))  # ordered by y, then by x
         for measure in (middle_m, *places_m[near].T):
             values = measure[best]
@@ -83,25 +80,25 @@ def worst_of(
     return WorstPlaces(source, tuple(chosen), tuple(distances_m))
 
 
-def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float:
+def stand_off_m(walls: Iterable[Wall], position_m: PointM) -> float:
     """Return the distance of a place from the nearest loaded wall, m."""
-    return float(least_distances_m(structures, np.array([position_m]))[0])
+    return float(least_distances_m(walls, np.array([position_m]))[0])
 
 
-def least_distances_m(structures: Iterable[AnyStructure], places_m: FloatArray) -> FloatArray:
+def least_distances_m(walls: Iterable[Wall], places_m: FloatArray) -> FloatArray:
     """Return the distances of places (places, 2) from the nearest loaded wall, m (places,)."""
     nearest_m = np.full(len(places_m), np.inf)
-    for wall in _loaded_walls(structures):
+    for wall in walls:
         np.minimum(nearest_m, _distances_m(wall, places_m), out=nearest_m)
     return nearest_m
 
 
 def _from_middle_m(
-    structures: Iterable[AnyStructure], places_m: FloatArray, nearest_m: FloatArray
+    walls: Iterable[Wall], places_m: FloatArray, nearest_m: FloatArray
 ) -> FloatArray:
     """Return the distance of places from the middle of the nearest loaded wall, m (places,)."""
     middle_m = np.full(len(places_m), np.inf)
-    for wall in _loaded_walls(structures):
+    for wall in walls:
         x_m, y_m = (wall.bounds_m if isinstance(wall, WallLine) else wall).centre
         aside_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
         is_nearest = _distances_m(wall, places_m) <= nearest_m + _EQUAL_M
@@ -109,18 +106,18 @@ def _from_middle_m(
     return middle_m
 
 
-def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> PointM:
+def nearest_point_m(walls: Iterable[Wall], position_m: PointM) -> PointM:
     """Return the point of the loaded walls nearest to a place.
 
     Raises:
-        ValueError: If no structure is protected.
+        ValueError: If there is none.
     """
     x_m, y_m = position_m
-    points = [_nearest_m(wall, position_m) for wall in _loaded_walls(structures)]
+    points = [_nearest_m(wall, position_m) for wall in walls]
     return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))
 
 
-def _nearest_m(wall: Rectangle | WallLine, place_m: PointM) -> PointM:
+def _nearest_m(wall: Wall, place_m: PointM) -> PointM:
     """Return the point of a wall nearest to a place."""
     if isinstance(wall, WallLine):
         return wall.point_at(float(wall.along_m(np.array([place_m]))[0].clip(0.0, wall.length_m)))
@@ -128,28 +125,9 @@ def _nearest_m(wall: Rectangle | WallLine, place_m: PointM) -> PointM:
     return min(max(place_m[0], left), right), min(max(place_m[1], bottom), top)
 
 
-def _distances_m(wall: Rectangle | WallLine, places_m: FloatArray) -> FloatArray:
+def _distances_m(wall: Wall, places_m: FloatArray) -> FloatArray:
     """Return the distances of places (places, 2) from a wall, m (places,)."""
     if isinstance(wall, WallLine):
         return wall.distances_m(places_m)
     x_m, y_m = np.ascontiguousarray(places_m.T)
     return box_distances_m(wall, (x_m, y_m, x_m, y_m))
-
-
-def _loaded_walls(structures: Iterable[AnyStructure]) -> Iterator[Rectangle | WallLine]:
-    """Yield the loaded walls of protected structures: of a rectangle as rectangles of width 0."""
-    for structure in structures:
-        if not structure.protected:
-            continue
-        if structure.footprint is not None:
-            walls = structure.footprint.walls
-            yield from (each for each in walls if each.side in structure.faces)
-            continue
-        left, bottom, right, top = structure.rectangle_m
-        sides: dict[WallName, Rectangle] = {
-            "west": Rectangle(left, bottom, left, top),
-            "east": Rectangle(right, bottom, right, top),
-            "south": Rectangle(left, bottom, right, bottom),
-            "north": Rectangle(left, top, right, top),
-        }
-        yield from (sides[wall] for wall in structure.faces)

@@ -25,7 +25,8 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.site.driving_steps import (
+from blast_env.sections import PointM
+from blast_env.vehicles.driving_steps import (
     DIRECTIONS,
     LENGTHS,
     NEVER,
@@ -36,8 +37,7 @@ from blast_env.site.driving_steps import (
     arcs_up_to,
     wide_places,
 )
-from blast_env.site.sections import PointM
-from blast_env.site.sources import Motion
+from blast_env.vehicles.vehicle import Motion
 
 GRAVITY_M_S2: Final = 9.81
 
@@ -88,7 +88,7 @@ class SpeedField:
                 larger otherwise.
         """
         # Imported here because Numba takes half a second to import.
-        from blast_env.site.driving_kernels import spread
+        from blast_env.vehicles.driving_kernels import spread
 
         def label(speed_km_h: float) -> float:
             return _run_up_m(motion, speed_km_h) / STEP_M
@@ -164,7 +164,7 @@ class SpeedField:
 
     def _hit(self, rectangle: Rectangle, among: BoolArray | None = None) -> int | None:
         """Return the state from which the vehicle hits a rectangle fastest, if there is one."""
-        from blast_env.site.driving_kernels import fastest_into
+        from blast_env.vehicles.driving_kernels import fastest_into
 
         left, bottom, right, top = rectangle.grown(self.half_m)
         _, rows, columns = self.run_up_m.shape

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, StrictFloat
 
-from blast_env.arrays import BoolArray
-from blast_env.site.catalogue import Variant
-from blast_env.site.crash_rating import CrashRating
-from blast_env.site.sections import Ground, Section, SparseSection
+from blast_env.arrays import BoolArray, any_in_windows, counts_before
+from blast_env.sections import Ground, Section, SparseSection
 from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.crash_rating import CrashRating
 
 
 def _check_whole_modules(width_m: float) -> float:
@@ -77,24 +75,23 @@ def is_open(way: AccessWay, passable: BoolArray) -> bool:
 
 
 def closing_places(
-    way: AccessWay, passable: BoolArray, variants: Iterable[Variant]
+    way: AccessWay, passable: BoolArray, sizes: Iterable[tuple[int, int]]
 ) -> Iterator[BoolArray]:
-    """Yield for each variant the lower left cells at which it closes the way (rows, columns).
+    """Yield for each size of piece the lower left cells at which it closes the way (rows, columns).
 
-    If the way is closed already, these are all cells; for measures, none.
+    If the way is closed already, these are all cells; for measures, of no size, none.
 
     Args:
         way: The way; no wider than the zone.
         passable: Cells that the vehicle may cover (rows, columns).
-        variants: The variants to be placed.
+        sizes: Rows and columns of cells of the pieces to be placed.
     """
     chains = _Chains.of(way, passable)
     known: dict[tuple[int, int], BoolArray] = {}
-    for variant in variants:
-        if variant.is_measure:
+    for size in sizes:
+        if 0 in size:
             yield np.zeros_like(passable)
             continue
-        size = variant.rows, variant.columns
         if size not in known:
             known[size] = chains.closed_by(size) if chains.leave_a_way else np.ones_like(passable)
         yield known[size]
@@ -160,29 +157,6 @@ def _beside(chain: BoolArray, width: int, rows: int, columns: int) -> BoolArray:
     )
     framed[width - 1 : width - 1 + places_up, width : width + places_right] = chain
     return any_in_windows(counts_before(framed), width + 1 + rows, width + 1 + columns)
-
-
-def counts_before(mask: BoolArray) -> NDArray[np.int32]:
-    """Return the number of true cells below and left of corners (..., rows + 1, columns + 1)."""
-    *many, rows, columns = mask.shape
-    counts = np.zeros((*many, rows + 1, columns + 1), dtype=np.int32)
-    np.cumsum(np.cumsum(mask, axis=-2, dtype=np.int32), axis=-1, out=counts[..., 1:, 1:])
-    return counts
-
-
-def any_in_windows(counts: NDArray[np.int32], rows: int, columns: int) -> BoolArray:
-    """Return whether any cell of each window is true.
-
-    Args:
-        counts: `counts_before` of the cells.
-        rows: Rows of a window.
-        columns: Columns of a window.
-
-    Returns:
-        By lower left cell (..., rows, columns); empty for windows larger than the grid.
-    """
-    strips = counts[..., rows:, :] - counts[..., :-rows, :]
-    return strips[..., columns:] > strips[..., :-columns]
 
 
 def _along_columns(way: AccessWay, cells: BoolArray) -> BoolArray:

@@ -1,7 +1,7 @@
 """The steps of a driving vehicle on a grid of places.
 
 Lengths are in steps along an axis, and speeds are labels: the run-up from standstill to the speed,
-v^2 / 2 a. See `blast_env.site.driving`.
+v^2 / 2 a. See `blast_env.vehicles.driving`.
 """
 
 from collections.abc import Iterator
