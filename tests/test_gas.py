@@ -11,7 +11,8 @@ import blast_env
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
-from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.standing import NOT_KNOWN
 from blast_env.gas.engine import GasRun
 from blast_env.results import EndReason
 from blast_env.site.blast_site import Charge

@@ -238,10 +238,17 @@ def _print_gas(result: "GasResult") -> None:
     if gauges:
         print_table("gauges", _GAUGES, gauges)
     print_answer(pieces_answer(result.pieces, "stability of the barrier"))
-    notes = dict.fromkeys(note for each in loads for note in each.notes)
     texts = [*standing_lines(scenario, result.buildings, "building")]
-    texts += [f"outside the validated range (marked ~): {note}" for note in notes]
-    texts += (*result.stepped_notes, *result.moved_gauges)
+    # One line a cause: a standing has named its own.
+    said = tuple(result.buildings["reason"])
+    notes = dict.fromkeys(note for each in loads for note in each.notes)
+    texts += [
+        f"outside the validated range (marked ~): {note}"
+        for note in notes
+        if not note.startswith(said)
+    ]
+    texts += [note for note in result.stepped_notes if not note.endswith(said)]
+    texts += result.moved_gauges
     texts += (f"{each.building}: {each.words}" for each in result.unjudged)
     cells = " x ".join(str(count) for count in result.run.grid.shape)
     _print_end(result, f"{cells} cells", "steps", texts)

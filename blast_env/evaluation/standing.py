@@ -4,7 +4,7 @@
 |---|---|
 | measured | in sight of the charge: within 6 % of Kingery and Bulmash's impulse |
 | verified | in the shade, where means agree with experiments and first waves with other codes |
-| approximate | cells too large for the charge, or an oblique wall |
+| approximate | cells too large for the charge, a charge above the ground, or an oblique wall |
 | outside | a scaled distance without comparison, or an impulse not captured |
 """
 
@@ -16,7 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.gas.settings import CHECKED_CELLS, CHECKED_SCALED_DISTANCE
+from blast_env.gas.oblique_walls import STEPPED
+from blast_env.gas.settings import cells_unchecked, distance_unchecked
 from blast_env.geometry import Rectangle
 from blast_env.response.facade import Bay
 from blast_env.site.blast_site import OUTWARDS, BlastSite
@@ -29,6 +30,9 @@ STANDING_COLUMNS: Final = (
     Column("reason", "", "reason for the standing"),
 )
 """The standing of the load of a row."""
+
+NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
+"""Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 
 _OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
 
@@ -74,7 +78,12 @@ def worst_standing(stood: Iterable[ReasonedStanding]) -> ReasonedStanding:
 
 
 def standing_of(
-    scaled_m: float, shaded: float, cells: float, is_known: bool, is_stepped: bool
+    scaled_m: float,
+    shaded: float,
+    cells: float,
+    is_known: bool,
+    is_stepped: bool,
+    is_raised: bool,
 ) -> ReasonedStanding:
     """Return the standing of a load.
 
@@ -84,20 +93,19 @@ def standing_of(
         cells: Cells per m/kg^(1/3) of the charge.
         is_known: Whether the impulse was captured.
         is_stepped: Whether the wall is oblique, modelled as a staircase.
+        is_raised: Whether the charge is above the ground.
     """
-    low, high = CHECKED_SCALED_DISTANCE
     if not is_known:
-        return ReasonedStanding(
-            LoadStanding.OUTSIDE, "impulse not yet captured at the end of the run"
-        )
-    if not low <= scaled_m <= high:
-        words = f"scaled distance {scaled_m:.2g} m/kg^(1/3), checked from {low:g} to {high:g}"
+        return ReasonedStanding(LoadStanding.OUTSIDE, NOT_KNOWN)
+    if words := distance_unchecked(scaled_m):
         return ReasonedStanding(LoadStanding.OUTSIDE, words)
-    if cells < CHECKED_CELLS:
-        words = f"{cells:.2g} cells per m/kg^(1/3), checked from {CHECKED_CELLS:g}"
+    if words := cells_unchecked(cells):
+        return ReasonedStanding(LoadStanding.APPROXIMATE, words)
+    if is_raised:
+        words = "a charge above the ground: not compared with measurements"
         return ReasonedStanding(LoadStanding.APPROXIMATE, words)
     if is_stepped:
-        return ReasonedStanding(LoadStanding.APPROXIMATE, "an oblique wall, modelled in steps")
+        return ReasonedStanding(LoadStanding.APPROXIMATE, STEPPED)
     if shaded > 0.0:
         part = "" if shaded == 1.0 else f"{shaded:.0%} of it "
         words = f"{part}in the shade: compared with experiments and other codes"
@@ -172,6 +180,7 @@ def bay_standings(
             cells,
             known.get(each.name, True),
             each.line is not None and min(map(abs, each.line.normal)) > _OBLIQUE,
+            site.charge.is_raised,
         )
         for each, distance_m, seen in zip(bays, *places, strict=True)
     )

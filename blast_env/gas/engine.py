@@ -31,7 +31,7 @@ from blast_env.gas.ending import (
 from blast_env.gas.faces import Faces, exposed_faces
 from blast_env.gas.grid import GasGrid, layers_to
 from blast_env.gas.probes import FaceLoads, Gauges
-from blast_env.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
+from blast_env.gas.settings import FACE_NAMES, GasSettings, cells_unchecked
 from blast_env.gas.solver import Gas, GasSolver, Recorder, Settling
 from blast_env.gas.source import (
     GasCharge,
@@ -245,12 +245,8 @@ class GasRun:
                 f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
                 "that its source needs"
             )
-        cells = cbrt(self.charge.mass_kg) / self.settings.smallest_m
-        if cells < CHECKED_CELLS:
-            notes.append(
-                f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
-                "take smaller cells"
-            )
+        if words := cells_unchecked(cbrt(self.charge.mass_kg) / self.settings.smallest_m):
+            notes.append(words)
         return tuple(notes)
 
 

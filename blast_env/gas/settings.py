@@ -21,6 +21,22 @@ CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
 CHECKED_CELLS: Final = 9.2
 """Least number of cells per m/kg^(1/3) with which the source was checked."""
 
+
+def distance_unchecked(scaled_m: float) -> str:
+    """Return in words that a scaled distance, m/kg^(1/3), was not checked; empty if it was."""
+    low, high = CHECKED_SCALED_DISTANCE
+    if low <= scaled_m <= high:
+        return ""
+    return f"scaled distance {scaled_m:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
+
+
+def cells_unchecked(cells: float) -> str:
+    """Return in words that cells per m/kg^(1/3) were not checked; empty if they were."""
+    if cells >= CHECKED_CELLS:
+        return ""
+    return f"{cells:.2g} cells per m/kg^(1/3), checked from {CHECKED_CELLS:g}: take smaller cells"
+
+
 UNIFORM: Final = "uniform"
 
 

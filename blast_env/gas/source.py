@@ -23,6 +23,7 @@ from blast_env.gas.grid import GasGrid
 from blast_env.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, Burning, GasSolver
 from blast_env.gas.spherical import PRODUCTS, Floats, SphericalBlast
 from blast_env.gas.state import GAMMA
+from blast_env.site.blast_site import TNT_KG_M3
 
 LEAST_RADIUS_CELLS: Final = 2
 """Least radius of the front, in cells, at which it is mapped onto a grid."""
@@ -72,7 +73,7 @@ class Explosive:
 
 
 TNT: Final = Explosive(
-    density_kg_m3=1630.0,
+    density_kg_m3=TNT_KG_M3,
     prompt_j_kg=2.95e6,
     later_j_kg=2.62e6,
     later_s_kg=1.0e-3,

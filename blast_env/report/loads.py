@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
-from blast_env.evaluation.standing import ReasonedStanding
+from blast_env.evaluation.engines.gas import GasBlast, GasResult
+from blast_env.evaluation.standing import NOT_KNOWN, ReasonedStanding
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder

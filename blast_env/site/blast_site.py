@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cbrt, hypot
+from math import cbrt, hypot, pi
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from blast_env.geometry import Cell, Rectangle, WallLine, WallName
@@ -22,6 +22,9 @@ OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
 """Outward normal of each wall."""
 
 
+TNT_KG_M3: Final = 1630.0
+"""Density of a charge of TNT."""
+
 BARRIER_NAME: Final = "barrier"
 """Name of the structure formed by the modules of a layout."""
 
@@ -40,6 +43,11 @@ class Charge(NamedTuple):
     position_m: tuple[float, float]
     tnt_kg: float
     height_m: float = 0.0
+
+    @property
+    def is_raised(self) -> bool:
+        """Whether it is above the ground: higher than the radius of a sphere of TNT."""
+        return self.height_m > cbrt(3.0 * self.tnt_kg / (4.0 * pi * TNT_KG_M3))
 
 
 class Gauge(NamedTuple):

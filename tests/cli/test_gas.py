@@ -12,7 +12,7 @@ from blast_env.layout import write_layout
 from blast_env.plots import film
 from blast_env.site import Scenario, save_scenario
 from tests.cli.running import run
-from tests.gas_sites import WALL, hut
+from tests.gas_sites import WALL, hut, site_document
 
 
 @pytest.fixture
@@ -46,6 +46,23 @@ def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path
     coarse = run("evaluate", *options, "--cell", 0.5).stdout
     assert "up to 2 blasts of gas" in coarse
     assert "(cells)" not in coarse
+
+
+def test_a_cause_of_doubt_has_one_line(tmp_path: Path) -> None:
+    """A load at 8.63 m/kg^(1/3) on cells too large for its charge, and one not captured."""
+    document = site_document(site={"width_m": 30.0, "height_m": 8.0, "air_height_m": 5.0})
+    document["charge"][0]["tnt_kg"] = 5.0
+    document["structures"][0]["corner_m"] = [2.0 + 8.63 * 5.0 ** (1 / 3), 3.0]
+    path = tmp_path / "far.toml"
+    save_scenario(Scenario.from_document(document, "far"), path)
+    shown = run("simulate", path, "--engine", "gas").stdout.splitlines()
+    (distance,) = (line for line in shown if "scaled distance" in line)
+    assert distance.startswith("standing of the load, hut: outside (scaled distance 8.63 m")
+    (cells,) = (line for line in shown if "cells per m/kg^(1/3)" in line)
+    assert cells.startswith("outside the validated range (marked ~): 3.4 cells")
+    assert sum("outside" in line for line in shown) == 3  # these two, and the table
+    early = run("simulate", path, "--engine", "gas", "--until", 0.001).stdout
+    assert early.count("not yet captured") == 1
 
 
 @pytest.mark.usefixtures("drawn")

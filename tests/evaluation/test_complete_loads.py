@@ -4,8 +4,9 @@ import pytest
 
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.consequences import Consequences, bay_table
-from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.standing import NOT_KNOWN
 from blast_env.report.loads import measure, targets_of
 from blast_env.site.blast_site import Charge
 from tests.gas_sites import glazed_hut, hut

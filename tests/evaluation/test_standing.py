@@ -15,18 +15,24 @@ from tests.gas_sites import WALL, glazed_hut, hut, site_document
 @pytest.mark.parametrize(
     ("place", "standing", "reason"),
     [
-        ((3.0, 0.0, 12.0, True, False), "measured", "in sight"),
-        ((3.0, 1.0, 12.0, True, False), "verified", "in the shade"),
-        ((3.0, 0.25, 12.0, True, False), "verified", "25% of it in the shade"),
-        ((3.0, 0.0, 12.0, True, True), "approximate", "oblique"),
-        ((3.0, 0.0, 5.0, True, False), "approximate", "5 cells per m/kg^(1/3), checked from 9.2"),
-        ((1.2, 0.0, 12.0, True, False), "outside", "scaled distance 1.2 m/kg^(1/3)"),
-        ((9.0, 1.0, 5.0, True, True), "outside", "checked from 1.7 to 8.6"),
-        ((3.0, 0.0, 12.0, False, False), "outside", "not yet captured"),
+        ((3.0, 0.0, 12.0, True, False, False), "measured", "in sight"),
+        ((3.0, 1.0, 12.0, True, False, False), "verified", "in the shade"),
+        ((3.0, 0.25, 12.0, True, False, False), "verified", "25% of it in the shade"),
+        ((3.0, 0.0, 12.0, True, True, False), "approximate", "oblique"),
+        ((3.0, 0.0, 12.0, True, False, True), "approximate", "above the ground"),
+        ((3.0, 1.0, 12.0, True, False, True), "approximate", "above the ground"),
+        (
+            (3.0, 0.0, 5.0, True, False, False),
+            "approximate",
+            "5 cells per m/kg^(1/3), checked from 9.2",
+        ),
+        ((1.2, 0.0, 12.0, True, False, False), "outside", "scaled distance 1.20 m/kg^(1/3)"),
+        ((9.0, 1.0, 5.0, True, True, False), "outside", "checked from 1.7 to 8.6"),
+        ((3.0, 0.0, 12.0, False, False, False), "outside", "not yet captured"),
     ],
 )
 def test_the_worst_reason_decides(
-    place: tuple[float, float, float, bool, bool], standing: str, reason: str
+    place: tuple[float, float, float, bool, bool, bool], standing: str, reason: str
 ) -> None:
     stood = standing_of(*place)
     assert stood.standing.label == standing
@@ -83,3 +89,13 @@ def test_an_evaluation_has_the_worst_standing_of_its_threats() -> None:
     assert found.to_dict()["structures"][0]["standing"] == "outside"
     by_particles = evaluate_layout("courtyard", (), range(1), engine="event")
     assert set(by_particles.table["standing"]) <= {"approximate", "outside"}
+
+
+def test_no_measurement_covers_an_air_burst() -> None:
+    """20 kg at a height of 3 m on cells of 0.25 m; on the ground it is measured."""
+    front = {**site_document()["structures"][0], "faces": ["west"]}
+    scenario, engine = hut(structures=[front]), GasEngine(cell_m=0.25)
+    for height_m, standing in ((0.0, LoadStanding.MEASURED), (3.0, LoadStanding.APPROXIMATE)):
+        charge = Charge((1.5, 4.0), 13.0, height_m)
+        found = GasBlast(scenario, engine=engine, charge=charge).run()
+        assert found.standing(["hut"]).standing is standing

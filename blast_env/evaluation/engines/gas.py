@@ -31,6 +31,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.evaluation.standing import (
+    NOT_KNOWN,
     STANDING_COLUMNS,
     LoadStanding,
     ReasonedStanding,
@@ -40,9 +41,9 @@ from blast_env.evaluation.standing import (
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
 from blast_env.gas.settings import (
-    CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
     GasSettings,
+    distance_unchecked,
 )
 from blast_env.gas.tables import (
     BUILDING_COLUMNS,
@@ -82,9 +83,6 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
     from blast_env.gas.engine import GasRun, Recorders
     from blast_env.tables import RunRecord
-
-NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
-"""Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 
 _AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
 _PROGRESS_CALLS: Final = 100
@@ -454,6 +452,7 @@ class GasResult:
             cells_of(peak_factor(run.grid.cell_m, run.site.charge.tnt_kg)),
             run.is_known(index),
             scenario.building_names[outline.name] in stepped_buildings(scenario.structures),
+            run.site.charge.is_raised,
         )
 
     def loads(self) -> BlastLoads:
@@ -575,12 +574,9 @@ class GasResult:
 
     def _notes(self, index: int) -> tuple[str, ...]:
         notes = list(self.run.notes)
-        low, high = CHECKED_SCALED_DISTANCE
-        scaled = self.run.site.scaled_distance(self.run.site.structures[index])
-        if not low <= scaled <= high:
-            notes.append(
-                f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
-            )
+        outline = self.run.site.structures[index]
+        if words := distance_unchecked(self.run.site.scaled_distance(outline)):
+            notes.append(words)
         if not self.run.is_known(index):
             waited = self.end_reason is not EndReason.LOADS_KNOWN
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
