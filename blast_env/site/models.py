@@ -447,11 +447,11 @@ def _omit_defaults(content: dict[str, Any], section: BaseModel, name: str) -> No
 
 
 def _without_test(content: dict[str, Any]) -> None:
-    """Remove the description of a crash rating, or the key of a missing one."""
+    """Remove what no result depends on from a crash rating, or the key of a missing one."""
     if content.get("crash_rating") is None:
         content.pop("crash_rating", None)
     else:
-        del content["crash_rating"]["test"]
+        del content["crash_rating"]["test"], content["crash_rating"]["measured_from"]
 
 
 def _without_negative_zero(value: Any) -> Any:

@@ -313,17 +313,52 @@ def test_without_a_speed_ratings_are_not_heeded() -> None:
 @pytest.mark.parametrize(
     ("code", "expected"),
     [
-        ("M30/P1", (6800.0, 48.0, 1.0)),
-        ("M50-P3", (6800.0, 80.0, 30.0)),
-        ("C7 50/P2".replace(" ", ""), (7200.0, 80.0, 7.0)),
-        ("V/7200[N2B]/80/90:0.7", (7200.0, 80.0, 0.7)),
-        ("V/7500[N3]/64/90.0/1.1/0", (7500.0, 64.0, 1.1)),
-        ("7500[N3]/80/90:2.3/4.0", (7500.0, 80.0, 2.3)),
+        ("M30/P1", (6800.0, 48.0, 1.0, "rear")),
+        ("M50-P3", (6800.0, 80.0, 30.0, "rear")),
+        ("M50 P1", (6800.0, 80.0, 1.0, "rear")),
+        ("ASTM F2656-15 M50/P1", (6800.0, 80.0, 1.0, "rear")),
+        ("C750/P2", (7200.0, 80.0, 7.0, "rear")),
+        ("PU60/P2", (2300.0, 96.0, 7.0, "rear")),
+        ("V/7200[N2B]/80/90:0.7", (7200.0, 80.0, 0.7, "front")),
+        ("IWA 14-1:2013 V/7200[N2A]/64/90:2.2", (7200.0, 64.0, 2.2, "front")),
+        ("IWA 14-1:2013 Bollard V/7200[N2A]/64/90:2.2", (7200.0, 64.0, 2.2, "front")),
+        ("ISO 22343-1:2023 V/7200[N3C]/80/90:1.2", (7200.0, 80.0, 1.2, "front")),
+        ("PAS 68:2013 Fixed bollard V/7500(N2)/64/90:0.4/6.7", (7500.0, 64.0, 0.4, "rear")),
+        ("V/7500[N3]/64/90.0/1.1/0", (7500.0, 64.0, 1.1, "front")),
+        ("7500(N3)/80/90:2.3/4.0", (7500.0, 80.0, 2.3, "rear")),
     ],
 )
-def test_codes_of_tests_are_read(code: str, expected: tuple[float, float, float]) -> None:
+def test_codes_of_tests_are_read(code: str, expected: tuple[float, float, float, str]) -> None:
     rating = CrashRating.model_validate(code)
-    assert (rating.mass_kg, rating.speed_km_h, rating.penetration_m) == expected
+    found = (rating.mass_kg, rating.speed_km_h, rating.penetration_m, rating.measured_from)
+    assert found == expected
+    assert rating.test == code
+
+
+def test_a_test_at_an_angle_covers_its_speed_across_the_barrier() -> None:
+    slanting = CrashRating.model_validate("V/7200[N3C]/80/30:1.2")
+    assert slanting.covers(7200.0, 40.0)  # 80 sin 30
+    assert not slanting.covers(7200.0, 41.0)
+    assert CrashRating.model_validate("V/7200[N3C]/80/90:1.2").covers(7200.0, 80.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("M60/P1", "its speeds are M30, M40, M50"),
+        ("H60/P1", "its speeds are H30, H40, H50"),
+        ("C70/P1", "its speeds are C30, C40, C50, C60"),
+        ("M50/P4", "its penetrations are P1, P2, P3"),
+        ("V/7200[N3C]/80/0:1.2", "angle is 0 degrees"),
+        ("V/7200[N3C]/80/120:1.2", "angle is 120 degrees"),
+    ],
+)
+def test_what_a_standard_does_not_have_is_refused(code: str, why: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        rated_site(code)
+    (problem,) = map(str, caught.value.problems)
+    assert problem.startswith(f"build_zone.items[0].crash_rating: is {code!r}, ")
+    assert why in problem
 
 
 @pytest.mark.parametrize("rating", ["K12", "M35/P1", "V/7200[N2A]/64", 7200.0])
