@@ -94,13 +94,44 @@ def suggestion(name: object, known: Iterable[str]) -> str:
     return f", did you mean {nearest[0]!r}?" if nearest else ""
 
 
-MAX_TEXT: Final = 60
-"""Most characters of a value or a key; longer ones are shortened."""
+MAX_TEXT: Final = 80
+"""Most characters of a value, a key or a name of a file in a message; longer ones are cut."""
+
+_MOST_REASON: Final = 300
+_PLAIN_WORD: Final = re.compile(r"[\w$-]+")
+_LONG_WORD: Final = re.compile(rf"\S{{{MAX_TEXT + 1},}}")
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:
     """Return the text, its end replaced by dots if it is too long."""
     return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def quoted(text: str, length: int = MAX_TEXT) -> str:
+    """Return a text of a user or a file in quotes, with all but printable characters escaped.
+
+    With quotes and escapes it has at most `length` characters; the end is replaced by dots if it is
+    longer.
+    """
+    shown, kept = repr(shortened(text, length)), min(len(text), length)
+    while len(shown) > length:
+        kept -= 1
+        shown = repr(text[:kept] + "...")
+    return shown
+
+
+def named(text: str) -> str:
+    """Return a name of a file, such as a layer or a tag: a single word as it is, others quoted."""
+    return text if len(text) <= MAX_TEXT and _PLAIN_WORD.fullmatch(text) else quoted(text)
+
+
+def reason_of(error: BaseException) -> str:
+    """Return the message of another library's exception as one line of at most 300 characters.
+
+    Such messages may hold texts of a file, so no word of it is longer than a quoted text.
+    """
+    words = " ".join(str(error)[: 10 * _MOST_REASON].split()) or type(error).__name__
+    return shortened(_LONG_WORD.sub(lambda match: shortened(match[0]), words), _MOST_REASON)
 
 
 KeyParts = tuple[str | int, ...]
@@ -113,15 +144,15 @@ def key_path(parts: Sequence[str | int]) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
         else:
-            key = part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else _quoted(part)
-            text += ("." if text else "") + shortened(key)
+            is_plain = len(part) <= MAX_TEXT and re.fullmatch(r"[A-Za-z0-9_-]+", part)
+            text += ("." if text else "") + (part if is_plain else quoted(part))
     return text
 
 
 def value_text(value: object) -> str:
     """Return a value as in a file, shortened."""
     if isinstance(value, str):
-        return _quoted(value)
+        return quoted(value)
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int):
@@ -161,8 +192,3 @@ def alternatives(values: Iterable[object]) -> str:
     """Return `'a', 'b' or 'c'`."""
     texts = [value_text(value) for value in values]
     return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
-
-
-def _quoted(text: str) -> str:
-    """Return the text in quotes, with all but printable characters escaped."""
-    return repr(shortened(text))

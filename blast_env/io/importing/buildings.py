@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, shortened
+from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
@@ -87,7 +87,7 @@ def _sound(site: PlacedSite, thing: Thing) -> Thing:
         thing.geometry.envelope, site.box
     ):
         return thing
-    words = f" ({shortened(thing.name)})" if thing.name else ""
+    words = f" ({named(thing.name)})" if thing.name else ""
     what = f"{site.path}: {thing.place}{words}: the outline"
     if not site.options.repair:
         reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()

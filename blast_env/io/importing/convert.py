@@ -11,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, quoted
 from blast_env.files import read_regular
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
-from blast_env.io.importing.fitting import FittedBuilding, fit_buildings, plain_name
+from blast_env.io.importing.fitting import MOST_TITLE, FittedBuilding, fit_buildings, plain_name
 from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
 from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Fate, Ledger
@@ -44,7 +44,6 @@ _CALIBRATION: Final = "collisional_kb"
 _MOST_SKETCHED: Final = 3000
 _SKETCH_DETAIL: Final = 2e-4  # of the map's extent
 _MOST_DESCRIPTION: Final = 2000
-_MOST_TITLE: Final = 100
 _GLASS: Final = "window_annealed_6"
 _HASH_DIGITS: Final = 12
 _PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf", ".ifc")
@@ -213,7 +212,7 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
     reader = next((_READERS[each] for each in _READERS if path.name.lower().endswith(each)), None)
     if reader is None:
         known = ", ".join(_READERS)
-        raise BlastEnvError(f"{path}: suffix is {path.suffix!r}, must be one of {known}")
+        raise BlastEnvError(f"{path}: suffix is {quoted(path.suffix)}, must be one of {known}")
     try:
         content = read_regular(path, MOST_BYTES)
     except BlastEnvError as error:
@@ -243,7 +242,7 @@ def _structures(
         if courtyards:
             part["courtyards_m"] = courtyards
         if building.title and building.title != name:
-            part["title"] = STEERING.sub(" ", building.title)[:_MOST_TITLE]
+            part["title"] = STEERING.sub(" ", building.title)[:MOST_TITLE]
         if len(walls) > 1:
             part["building"] = group[0].name
             part["weight"] = round(each.polygon.length * building.wall_height_m / whole, 6)
@@ -273,7 +272,7 @@ def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
     return {
         _window_of(each): {
             **glass,
-            "title": f"window of {each.title or each.name}"[:_MOST_TITLE],
+            "title": f"window of {each.title or each.name}"[:MOST_TITLE],
             "width_m": each.facade["width"],
             "height_m": each.facade["height"],
             "sill_m": each.facade["sill"],

@@ -1,5 +1,6 @@
 """Reading of DXF drawings."""
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
@@ -13,7 +14,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
+from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
@@ -45,6 +46,10 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
     from ezdxf.render.mesh import MeshBuilder
     from ezdxf.transform import copies
+
+# What ezdxf mends is on the ledger. Without a handler, its lines with whole texts of a file would
+# go to standard error.
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
 UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
     {"m": 1.0, "mm": 0.001, "cm": 0.01, "dm": 0.1, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
@@ -125,7 +130,7 @@ def _set_scales(site_map: SiteMap, document: Drawing) -> None:
                 if insert.dxf.get(name, 1.0) == 0.0:
                     insert.dxf.set(name, 1.0)
                     kind = "inserts with a scale of 0, taken as 1"
-                    place = f"INSERT {insert.dxf.get('handle')}"
+                    place = f"INSERT {_handle(insert)}"
                     site_map.ledger.add(Fate.GUESSED, kind, place, detail=name)
 
 
@@ -144,7 +149,7 @@ def _check_entities(path: Path, document: Drawing) -> None:
             for number in _numbers(entity):
                 if not abs(number) <= MOST_COORDINATE:
                     raise BlastEnvError(
-                        f"{path}: {entity.dxftype()} {entity.dxf.get('handle')}: has the number "
+                        f"{path}: {_kind(entity)} {_handle(entity)}: has the number "
                         f"{number:g}, must be within {MOST_COORDINATE:g}"
                     )
             total += 1
@@ -192,6 +197,16 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
         yield from (*entity.knots, *entity.weights)
 
 
+def _kind(entity: DXFEntity) -> str:
+    return named(entity.dxftype())
+
+
+def _handle(entity: DXFEntity) -> str:
+    """Return the handle of an entity, or an empty string without one."""
+    handle = entity.dxf.get("handle")
+    return named(str(handle)) if handle else ""
+
+
 def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
     if unit is None:
         code = int(document.units)
@@ -207,7 +222,8 @@ def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
             )
     if unit not in UNITS_M:
         raise BlastEnvError(
-            f"units is {unit!r}{suggestion(unit, UNITS_M)}, must be one of {', '.join(UNITS_M)}"
+            f"units is {quoted(unit)}{suggestion(unit, UNITS_M)}, must be one of "
+            f"{', '.join(UNITS_M)}"
         )
     return UNITS_M[unit]
 
@@ -232,13 +248,13 @@ class _Drawn:
         for entity in self.document.modelspace():
             for part, layer in self._parts(entity, "0"):
                 number += 1
-                handle = entity.dxf.get("handle") or f"no. {number}"
+                handle = _handle(entity) or f"no. {number}"
                 own = handle if part is entity else f"{handle}/{number}"
-                place = f"{part.dxftype()} {own} on the layer {layer}"
+                place = f"{_kind(part)} {own} on the layer {named(layer)}"
                 yield self._feature(part, layer, place)
             for part, reason in self.skipped:
                 number += 1
-                place = f"{part.dxftype()} {entity.dxf.get('handle')}/{number}"
+                place = f"{_kind(part)} {_handle(entity)}/{number}"
                 kind = f"entities of blocks that cannot be placed ({reason})"
                 layer = str(part.dxf.get("layer", "0"))
                 yield MapFeature(_NOWHERE, {"layer": layer}, place, kind)
@@ -292,7 +308,7 @@ class _Drawn:
                 raise
             kind = "references to other files, or to blocks that are not there"
             if not isinstance(entity, Insert):
-                kind = f"entities of the type {entity.dxftype()}"
+                kind = f"entities of the type {_kind(entity)}"
             return MapFeature(_NOWHERE, tags, place, kind)
         if geometry.is_empty:
             return MapFeature(_NOWHERE, tags, place, "entities without an extent in plan")

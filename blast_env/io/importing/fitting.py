@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.errors import BlastEnvError, import_extra, named, quoted, shortened
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.outlines import areas_of, check_outlines, walls_of
@@ -24,6 +24,9 @@ with import_extra("maps", "maps and drawings"):
 
 MOST_STRUCTURES: Final = 100
 """Most structures of a scenario."""
+
+MOST_TITLE: Final = 100
+"""Most characters of a title of a scenario; longer names of a map are cut."""
 
 _MOST_NAME: Final = 34  # characters, which leaves room for the letters of parts
 _BARRIER: Final = "barrier"
@@ -74,7 +77,7 @@ class FittedBuilding:
 
     Attributes:
         name: Its name in the scenario.
-        title: Its name on the map, or an empty string.
+        title: Its name on the map, cut to `MOST_TITLE` characters, or an empty string.
         place: Its place in the file.
         outline: Its outline in site metres, cut at the site's border.
         polygons: The polygons of its structures: several if the border cuts it apart.
@@ -198,7 +201,7 @@ def _fitted(
         base_m = max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
     return FittedBuilding(
         name=name,
-        title=thing.name,
+        title=shortened(thing.name, MOST_TITLE),
         place=thing.place,
         outline=thing.geometry,
         polygons=polygons,
@@ -329,7 +332,7 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 def plain_name(title: str) -> str:
     """Return a title in the letters of names: `Lodz_Sad`, `b_1st_National`; empty without any."""
-    name = re.sub(r"[^A-Za-z0-9-]+", "_", anyascii(title).replace("'", "")).strip("_-")
+    name = re.sub(r"[^A-Za-z0-9-]+", "_", anyascii(title[:MOST_TITLE]).replace("'", "")).strip("_-")
     return (f"b_{name}" if name[:1].isdigit() else name)[:_MOST_NAME].rstrip("_-")
 
 
@@ -337,7 +340,7 @@ def _no_building(site: PlacedSite) -> BlastEnvError:
     """Return the error of a site without buildings."""
     hint = ": the file has none; define them with --buildings-from"
     if site.layers:
-        layers = ", ".join(site.layers[:_MOST_LISTED])
+        layers = ", ".join(map(named, site.layers[:_MOST_LISTED]))
         hint = f": name their layer with --buildings-from; the file has {layers}"
     elif site.of_role(Role.BUILDING):
         hint = ": buildings of the file lie elsewhere, or are smaller than --least-area"
@@ -371,17 +374,17 @@ def _with_protected(
 
 def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> int:
     """Return the index of the building of a name, the scenario's or the map's."""
-    asked = name.casefold()
+    asked = shortened(name, MOST_TITLE).casefold()
     for key in ("name", "title"):
         for index, each in enumerate(buildings):
             if getattr(each, key).casefold() == asked:
                 return index
     for lost in site.ledger.of(Fate.LEFT_OUT):
-        if lost.name.casefold() == asked:
+        if lost.name.casefold() == name.casefold():
             raise BlastEnvError(
-                f"--protect is {name!r}, which is left out: {lost.place}: {lost.kind}"
+                f"--protect is {quoted(name)}, which is left out: {lost.place}: {lost.kind}"
             )
-    raise BlastEnvError(f"--protect is {name!r}, but there are {_listed(buildings)}")
+    raise BlastEnvError(f"--protect is {quoted(name)}, but there are {_listed(buildings)}")
 
 
 def _nearest(
@@ -398,7 +401,7 @@ def _nearest(
         if each.place not in reasons or each.role is not Role.BUILDING or each.geometry.is_empty:
             continue
         if each.geometry.convex_hull.distance(point) < distances_m[best]:
-            words = f" ({shortened(each.name)})" if each.name else ""
+            words = f" ({named(each.name)})" if each.name else ""
             raise BlastEnvError(
                 f"--protect-near is {place[0]:.10g},{place[1]:.10g}: the building nearest to it "
                 f"is {each.place}{words}, which is left out: {reasons[each.place]}"
@@ -417,7 +420,7 @@ def _listed(buildings: Sequence[FittedBuilding]) -> str:
     shown = [
         each.name
         if "_".join(each.title.split()) in ("", each.name)
-        else f"{each.name} ({each.title})"
+        else f"{each.name} ({named(each.title)})"
         for each in titled[:_MOST_LISTED]
     ]
     more = len(buildings) - len(shown)

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, shortened, value_text
+from blast_env.errors import BlastEnvError, reason_of, value_text
 from blast_env.io.importing.site_map import (
     WGS84,
     MapFeature,
@@ -61,7 +61,7 @@ def _parsed(path: Path, content: bytes) -> Mapping[str, Any]:
     except RecursionError as error:
         raise BlastEnvError(f"{path}: is nested too deeply") from error
     except ValueError as error:
-        raise BlastEnvError(f"{path}: is not JSON: {shortened(str(error), 300)}") from error
+        raise BlastEnvError(f"{path}: is not JSON: {reason_of(error)}") from error
     if not isinstance(document, dict):
         raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
     return document

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, named
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
@@ -102,7 +102,7 @@ def _reason(element: Any) -> str:
 
 
 def _place(element: Any) -> str:
-    return f"{element.is_a()} {element.GlobalId}"
+    return f"{element.is_a()} {named(str(element.GlobalId))}"
 
 
 def _solids(model: Any, elements: list[Any]) -> Iterator[_Solid]:

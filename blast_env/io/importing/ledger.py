@@ -7,12 +7,13 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError, shortened
+from blast_env.errors import BlastEnvError, quoted, shortened
 from blast_env.files import write_atomically
 
 MOST_LETTERS: Final = 300
 """Most letters of a line where people read it."""
 
+_MOST_NAME: Final = 32  # letters, where a line has many objects
 _MOST_CUT_LINES: Final = 12
 _MOST_NAMED: Final = 50
 
@@ -62,7 +63,7 @@ class LedgerEntry:
     @property
     def words(self) -> str:
         """The object with its name and detail, for texts."""
-        name = f" {shortened(self.name, 30)!r}" if self.name else ""
+        name = f" {quoted(self.name, _MOST_NAME)}" if self.name else ""
         return f"{self.place}{name}: {self.detail}" if self.detail else f"{self.place}{name}"
 
 

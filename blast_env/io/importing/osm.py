@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, reason_of
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import (
@@ -94,7 +94,7 @@ def _unpacked(path: Path) -> Iterator[Path]:
             ):
                 _copy(packed, file, path)
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise BlastEnvError(f"{path}: cannot be unpacked: {error}") from error
+            raise BlastEnvError(f"{path}: cannot be unpacked: {reason_of(error)}") from error
         yield plain
 
 

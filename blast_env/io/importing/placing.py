@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.options import (
@@ -33,6 +33,7 @@ _EXCHANGED: Final = ": are longitude and latitude exchanged?"
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 _WIDER: Final = "ground around buildings, widened to the nearest street"
 _LEAST_STREET_M: Final = 1.0
+_MOST_LISTED: Final = 20
 _TO_BORDER_M: Final = 1.0  # of charges
 
 
@@ -152,12 +153,12 @@ def _nothing(site_map: SiteMap, faulty: Sequence[Thing]) -> BlastEnvError:
     """Return the error of a map without a building."""
     chosen = site_map.options.buildings_from
     faults = Counter(each.fault for each in faulty if each.role is Role.BUILDING)
-    reasons = "; ".join(f"{count} {fault}" for fault, count in faults.items())
+    reasons = "; ".join(f"{count} {fault}" for fault, count in faults.most_common(_MOST_LISTED))
     if reasons:
         return BlastEnvError(f"{site_map.path}: has no building that can be used, but {reasons}")
     advice = "define them with --buildings-from and --charges-from"
     if chosen:
-        advice = f"--buildings-from {' '.join(chosen)} chooses nothing"
+        advice = f"--buildings-from {' '.join(map(named, chosen[:_MOST_LISTED]))} chooses nothing"
     return BlastEnvError(f"{site_map.path}: has no building that is marked as such; {advice}")
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
+from blast_env.errors import BlastEnvError, import_extra, reason_of, value_text
 from blast_env.site.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
 
 with import_extra("maps", "maps and drawings"):
@@ -51,8 +51,8 @@ class LocalPlane:
         outside = not np.isfinite([longitude, latitude]).all() or abs(latitude) > 90.0
         if outside or abs(longitude) > 180.0:
             raise BlastEnvError(
-                f"{words} is not on the Earth in {shortened(crs)}: say with --crs which system the "
-                "coordinates are of"
+                f"{words} is not on the Earth in {value_text(crs)}: say with --crs which "
+                "system the coordinates are of"
             )
         if abs(latitude) > _MOST_LATITUDE_DEG:
             raise BlastEnvError(
@@ -191,7 +191,7 @@ def _system(crs: str) -> CRS:
     try:
         system = CRS.from_user_input(crs)
     except CRSError as error:
-        reason = shortened(str(error).splitlines()[0])
+        reason = reason_of(error)
         raise BlastEnvError(
             f"crs is {value_text(crs)}, which pyproj does not know: {reason}"
         ) from error
@@ -214,7 +214,7 @@ def _check_area_of_use(system: CRS, crs: str, words: str, place: tuple[float, fl
     if (beside and not crosses) or not south - _FAR_DEG <= latitude <= north + _FAR_DEG:
         raise BlastEnvError(
             f"{words} is at longitude {longitude:.4f}, latitude {latitude:.4f} in "
-            f"{shortened(crs)}, which is for longitudes {west:g} to {east:g} and latitudes "
+            f"{value_text(crs)}, which is for longitudes {west:g} to {east:g} and latitudes "
             f"{south:g} to {north:g}: say with --crs which system the "
             "coordinates are of"
         )
@@ -224,5 +224,5 @@ def _transformed(transformer: Transformer, places: FloatArray) -> FloatArray:
     try:
         x, y = transformer.transform(places[:, 0], places[:, 1])
     except ProjError as error:
-        raise BlastEnvError(f"coordinates cannot be transformed: {error}") from error
+        raise BlastEnvError(f"coordinates cannot be transformed: {reason_of(error)}") from error
     return np.stack([np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)], axis=1)

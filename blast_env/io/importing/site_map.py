@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, shortened
+from blast_env.errors import BlastEnvError, reason_of
 from blast_env.io.importing.ledger import FATES, Fate, Ledger, LedgerEntry
 from blast_env.io.importing.options import ImportOptions
 
@@ -191,5 +191,4 @@ def errors_of(package: str, path: object, kind: str) -> Iterator[None]:
         modules = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames}
         if isinstance(error, BlastEnvError | MemoryError) or package not in modules:
             raise
-        what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
-        raise BlastEnvError(f"{path}: cannot be read as {kind}: {what}") from error
+        raise BlastEnvError(f"{path}: cannot be read as {kind}: {reason_of(error)}") from error

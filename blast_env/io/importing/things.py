@@ -13,7 +13,7 @@ from typing import Final
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import MAX_TEXT, BlastEnvError, value_text
+from blast_env.errors import MAX_TEXT, BlastEnvError, named, quoted, value_text
 from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 from blast_env.values import typed_number
@@ -115,7 +115,7 @@ class Selector:
         key, sign, value = text.partition("=")
         if not key or (sign and not value):
             example = "a layer" if is_drawing else "KEY or KEY=VALUE"
-            raise BlastEnvError(f"{text!r} chooses nothing, must be {example}")
+            raise BlastEnvError(f"{quoted(text)} chooses nothing, must be {example}")
         if sign:
             return cls(key, value)
         return cls("layer", text) if is_drawing else cls(key, None)
@@ -213,7 +213,9 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
             found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
         else:
             chief = next((key for key in (*_CHIEF_KEYS, *feature.tags) if key in feature.tags), "")
-            kind = f"layer {feature.tags['layer']}" if site_map.has_layers else chief or "no tag"
+            kind = named(chief) if chief else "no tag"
+            if site_map.has_layers:
+                kind = f"layer {named(str(feature.tags['layer']))}"
             site_map.ledger.add(Fate.PASSED, f"without a role: {kind}", feature.place)
     return tuple(found)
 
@@ -342,7 +344,7 @@ def _width_m(feature: MapFeature, ledger: Ledger) -> float | None:
     lanes = length_m(feature.tags.get("lanes", ""))
     width_m = _LANE_M * (lanes or (1 if road in _NARROW else 2))
     if lanes is None:
-        ledger.add(Fate.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {road}")
+        ledger.add(Fate.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {named(road)}")
     return width_m
 
 

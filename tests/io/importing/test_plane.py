@@ -61,7 +61,11 @@ def test_drawing_goes_back_to_its_own_units() -> None:
 @pytest.mark.parametrize(
     ("crs", "place", "words"),
     [
-        ("EPSG:4326", (565_000.0, 5_980_000.0), "is not on the Earth in EPSG:4326: say with --crs"),
+        (
+            "EPSG:4326",
+            (565_000.0, 5_980_000.0),
+            "is not on the Earth in 'EPSG:4326': say",
+        ),
         ("EPSG:25832", (7.5, 54.8), "is for longitudes 6 to 12.01"),
         ("EPSG:25832", (1e12, 1e12), "is not on the Earth"),
         ("EPSG:999999", (0.0, 0.0), "which pyproj does not know"),

@@ -16,7 +16,7 @@ from ezdxf import units
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
 from blast_env.io.importing.convert import read_map
 from blast_env.io.importing.ledger import FATES, Fate, Ledger, LedgerEntry
@@ -412,7 +412,7 @@ def test_names_of_the_map_stay_titles_and_become_latin_ids(
     site = imported(path, protect=(title,))
     (structure,) = site.scenario.structures
     assert (structure.name, structure.title) == (name, title)
-    assert f"{name} ({title})" in error_of(path)
+    assert f"{name} ({named(title)})" in error_of(path)
     assert site.scenario.title_of(name) == title
     (label,) = (each.label for each in site_features(site.scenario) if each.name == name)
     assert label.startswith(title)
