@@ -107,6 +107,11 @@ def import_map(
     glazing: GlazingOption = None,
     wall: WallOption = None,
     height_from: str | None = typer.Option(None, help="Property with the height."),
+    height_unit: str | None = typer.Option(
+        None,
+        help="Unit of heights, widths and diameters without one: m, mm, cm, dm, km, in, ft.",
+        show_default="m; ft, as a guess, if the coordinates are in feet",
+    ),
     default_height_m: float | None = typer.Option(
         None,
         "--default-height",

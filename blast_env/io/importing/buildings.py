@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, named
+from blast_env.io.importing.doubles import without_doubles
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
@@ -57,6 +58,10 @@ _STOREYS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
 """Likely and low numbers of storeys by the value of `building` or `man_made`."""
 
 _USUAL: Final = (2, 1)
+_FEW: Final = 2
+_MOST_STOREYS_LOW: Final = 10
+_MOST_STOREYS: Final = 200
+_BRIDGE: Final = "bridge"
 _GENERAL: Final = ("", "yes")
 _HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
 
@@ -69,6 +74,7 @@ def prepared(site: PlacedSite) -> PlacedSite:
     """
     others = [each for each in site.things if each.role is not Role.BUILDING]
     buildings = [_sound(site, each) for each in site.of_role(Role.BUILDING)]
+    buildings = without_doubles(buildings, site.ledger)
     buildings = _with_heights(site, _with_parts(site, buildings))
     return replace(site, things=(*others, *_apart(site, buildings)))
 
@@ -110,7 +116,8 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
     for part in things:
         if not part.is_part:
             continue
-        own = _building_of(part, wholes, tree)
+        own = next((k for k, each in enumerate(wholes) if each.place == part.part_of), None)
+        own = _building_of(part, wholes, tree) if own is None else own
         if own is None:
             found.append(replace(part, is_part=False))
         elif part.height_m is None or part.geometry.area < site.options.least_area_m2:
@@ -227,8 +234,27 @@ def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:
             kind = "roofs on posts, open below"
             site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name, f"from {base_m:g} m")
             thing = replace(thing, base_m=base_m)
+        _check_height(site, thing)
         found.append(thing)
     return found
+
+
+def _check_height(site: PlacedSite, thing: Thing) -> None:
+    """Enter a height that hardly any building of the kind has, and a bridge without an underside.
+
+    More than ten storeys of a kind that has one or two as a rule, and more than 200 of others, are
+    assumed to be in another unit.
+    """
+    height_m = thing.height_m or 0.0
+    low = thing.kind in _STOREYS and _STOREYS[thing.kind][0] <= _FEW
+    most_m = (_MOST_STOREYS_LOW if low else _MOST_STOREYS) * site.options.level_height_m
+    if height_m > most_m:
+        kind = "heights that hardly any building has: are they in metres? (--height-unit)"
+        detail = f"{height_m:g} m, {named(thing.kind or 'building')}, at most {most_m:g} m expected"
+        site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name, detail)
+    if thing.kind == _BRIDGE and not thing.base_m:
+        kind = "buildings that are bridges, solid to the ground without a min_height"
+        site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name)
 
 
 class _Guess:

@@ -17,6 +17,7 @@ from blast_env.geometry import Rectangle
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
 from blast_env.io.importing.fitting import MOST_TITLE, FittedBuilding, fit_buildings, plain_name
+from blast_env.io.importing.formats import way_of
 from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
 from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Fate, Ledger
@@ -212,7 +213,9 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
     reader = next((_READERS[each] for each in _READERS if path.name.lower().endswith(each)), None)
     if reader is None:
         known = ", ".join(_READERS)
-        raise BlastEnvError(f"{path}: suffix is {quoted(path.suffix)}, must be one of {known}")
+        raise BlastEnvError(
+            f"{path}: suffix is {quoted(path.suffix)}, must be one of {known}{way_of(path)}"
+        )
     try:
         content = read_regular(path, MOST_BYTES)
     except BlastEnvError as error:

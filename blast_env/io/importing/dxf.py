@@ -1,11 +1,10 @@
 """Reading of DXF drawings."""
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -16,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.lengths import UNITS_M
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,
@@ -51,11 +51,6 @@ with import_extra("maps", "maps and drawings"):
 # go to standard error.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
-UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
-    {"m": 1.0, "mm": 0.001, "cm": 0.01, "dm": 0.1, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
-)
-"""Lengths of units in metres, by the names that `--units` takes."""
-
 MOST_LINES: Final = 2_000_000
 """Most lines of a file: each number of an entity takes one line, and its group code another."""
 
@@ -89,6 +84,7 @@ def read_dxf(site_map: SiteMap) -> None:
         BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
     """
     path, options = site_map.path, site_map.options
+    options.refuse("a drawing, whose heights are in --units", "height_unit")
     site_map.has_layers = True
     check_count(path, site_map.content.count(b"\n"), MOST_LINES, "lines of text")
     with errors_of("ezdxf", path, "DXF"):

@@ -10,11 +10,12 @@ from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, reason_of, value_text
+from blast_env.io.importing.formats import way_of_json
+from blast_env.io.importing.properties import tags_of
 from blast_env.io.importing.site_map import (
     WGS84,
     MapFeature,
     SiteMap,
-    Tags,
     check_count,
     errors_of,
 )
@@ -61,7 +62,9 @@ def _parsed(path: Path, content: bytes) -> Mapping[str, Any]:
     except RecursionError as error:
         raise BlastEnvError(f"{path}: is nested too deeply") from error
     except ValueError as error:
-        raise BlastEnvError(f"{path}: is not JSON: {reason_of(error)}") from error
+        lines = "; if it has a feature in each line, convert it with ogr2ogr -f GeoJSON"
+        hint = lines if str(error).startswith("Extra data") else ""
+        raise BlastEnvError(f"{path}: is not JSON: {reason_of(error)}{hint}") from error
     if not isinstance(document, dict):
         raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
     return document
@@ -79,9 +82,10 @@ def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
         return [document]
     if kind in _KINDS:
         return [{"type": "Feature", "geometry": document, "properties": {}}]
+    what = way_of_json(document, path.name) or "is it GeoJSON?"
     raise BlastEnvError(
         f"{path}: type is {value_text(kind)}, must be 'FeatureCollection', 'Feature' or that of a "
-        "geometry: is it GeoJSON?"
+        f"geometry: {what}"
     )
 
 
@@ -92,8 +96,8 @@ def _feature(path: Path, place: str, item: Any) -> MapFeature:
     given = item.get("geometry")
     geometry = shapely.Point() if given is None else _geometry(path, place, given)
     if geometry.is_empty:
-        return MapFeature(geometry, _tags(item), place, "features without a geometry")
-    return MapFeature(geometry, _tags(item), place)
+        return MapFeature(geometry, tags_of(item), place, "features without a geometry")
+    return MapFeature(geometry, tags_of(item), place)
 
 
 def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
@@ -105,15 +109,6 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
         )
     with errors_of("shapely", f"{path}: {place}.geometry", "a geometry"):
         return shapely.force_2d(shape(document))
-
-
-def _tags(item: Mapping[str, Any]) -> Tags:
-    """Return the properties with plain values, and the identifier."""
-    properties = item.get("properties")
-    tags = dict(properties) if isinstance(properties, dict) else {}
-    if "id" in item:
-        tags.setdefault("id", item["id"])
-    return {str(key): value for key, value in tags.items() if isinstance(value, str | int | float)}
 
 
 def _crs(path: Path, document: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ Areas of the map become modules, and these few rectangles.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
+from math import dist
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, fewest_runs
 from blast_env.io.importing.fitting import FittedBuilding
 from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.options import PlaceXY
 from blast_env.io.importing.outlines import check_outlines, mended
+from blast_env.io.importing.passages import Mouths, mouths_of
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
@@ -42,6 +45,7 @@ _CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
 _DIGITS: Final = 3
 _BUILT_OVER: Final = "places of charges that are built over, or too near to a building or border"
 _POINT_SHARE_M: Final = 5.0
+_AT_MOUTH_M: Final = 0.5
 _CLEARANCE_M: Final = 1.0  # of barriers from structures
 _HALF: Final = 0.5  # of a block
 _ANY: Final = 1e-3  # of a block: a single module suffices
@@ -69,13 +73,13 @@ def charge_sources(
         BlastEnvError: If there is no place for a charge, or there are too many.
     """
     free = _free(site, buildings, radius_m)
-    asked = list(_asked(site, free))
+    asked, mouths = list(_asked(site, free)), mouths_of(site, buildings, free)
     things, most = _on_site(site, Role.CHARGE), MOST_SOURCES - len(asked)
-    sources, has_kerbs = _fewest(site, things, free, most), True
+    sources, has_kerbs = _fewest(site, things, free, mouths, most), True
     if len(sources) > most and any(each.width_m for each in things):
         has_kerbs = False
         things = [replace(each, width_m=None) for each in things]
-        sources = _fewest(site, things, free, most)
+        sources = _fewest(site, things, free, mouths, most)
     if len(sources) > most:
         raise BlastEnvError(
             f"{site.path}: charges may be at {len(sources) + len(asked)} places, must be at most "
@@ -111,18 +115,35 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
 
 
 def _fewest(
-    site: PlacedSite, things: Sequence[Thing], free: BaseGeometry, most: int
+    site: PlacedSite, things: Sequence[Thing], free: BaseGeometry, mouths: Mouths, most: int
 ) -> list[tuple[str, dict[str, Any]]]:
     """Return the sources of things with their places, in the finest form of at most `most`."""
     for tolerance_m in _SIMPLER_M:
         sources = [
             (each.place, source | {"tnt_kg": each.tnt_kg or site.options.tnt_kg})
             for each in things
-            for source in _sources(site, each, free, tolerance_m)
+            for source in _with_mouths(
+                list(_sources(site, each, free, tolerance_m)), mouths.get(each.place, ())
+            )
         ]
         if len(sources) <= most:
             break
     return sources
+
+
+def _with_mouths(
+    sources: list[dict[str, Any]], mouths: Sequence[PlaceXY]
+) -> Iterator[dict[str, Any]]:
+    """Yield the places of a charge of a street, and its mouths to which it does not lead."""
+    yield from sources
+    ends = [end for each in sources if each["kind"] == "segment" for end in _ends_of(each)]
+    for place in mouths:
+        if all(dist(place, end) > _AT_MOUTH_M for end in ends):
+            yield _point(*place)
+
+
+def _ends_of(segment: dict[str, Any]) -> tuple[PlaceXY, PlaceXY]:
+    return segment["start_m"], segment["end_m"]
 
 
 def _asked(site: PlacedSite, free: BaseGeometry) -> Iterator[dict[str, Any]]:

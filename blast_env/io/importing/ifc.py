@@ -64,7 +64,7 @@ def read_ifc(site_map: SiteMap) -> None:
         BlastEnvError: If the file cannot be read, states no unit of length, or has no building.
     """
     path, options, ledger = site_map.path, site_map.options, site_map.ledger
-    options.refuse("IFC, which states its unit", "units")
+    options.refuse("IFC, which states its unit", "units", "height_unit")
     options.refuse("IFC, which is in metres of its own", "crs")
     with errors_of("ifcopenshell", path, "IFC"):
         model = ifcopenshell.open(str(path))

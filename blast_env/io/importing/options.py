@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
+from blast_env.io.importing.lengths import UNITS_M
 from blast_env.units import MODULE_SIDE_M
 
 PlaceXY = tuple[float, float]
@@ -62,6 +63,8 @@ class ImportOptions:
         stock: Modules that there are to place.
         wall_height_m: Height of the modules.
         height_from: Property with the height.
+        height_unit: Unit of heights, widths and diameters without one: m, mm, cm, dm, km, in, ft;
+            by default m, or ft, as a guess, if the coordinates are in feet.
         default_height_m: Height of buildings without one; guessed from neighbours and kind.
         low_heights: Take the low guess of heights that the file does not have.
         level_height_m: Height of a storey.
@@ -94,6 +97,7 @@ class ImportOptions:
     stock: int = 20
     wall_height_m: float = 3.0
     height_from: str | None = None
+    height_unit: str | None = None
     default_height_m: float | None = None
     low_heights: bool = False
     level_height_m: float = 3.0
@@ -110,6 +114,11 @@ class ImportOptions:
         for side_m in self.size_m or ():
             if not 2.0 <= side_m <= MOST_SITE_M:
                 raise BlastEnvError(f"--size is {side_m:g}, must be 2 to {MOST_SITE_M:g} m")
+        if self.height_unit is not None and self.height_unit not in UNITS_M:
+            raise BlastEnvError(
+                f"--height-unit is {value_text(self.height_unit)}, must be one of "
+                f"{', '.join(UNITS_M)}"
+            )
         _refuse_both("--origin", self.origin, "--centre", self.centre)
         _refuse_both("--zone", self.zone_m, "--zone-around", self.zone_around_m)
         _refuse_both("--zone-from", self.zone_from or None, "--zone", self.zone_m)

@@ -4,13 +4,12 @@ import bz2
 import gzip
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isclose
 from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any, Final
-from xml.parsers import expat
 
 import shapely
 from shapely.geometry import LineString, Point, Polygon
@@ -19,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.errors import BlastEnvError, import_extra, reason_of
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.overpass import Marks, marks_of, readable
 from blast_env.io.importing.site_map import (
     MOST_POINTS,
     WGS84,
@@ -46,12 +46,17 @@ _LEAST_RING: Final = 4  # points, the first one again at the end
 _AREAS: Final = ("multipolygon", "boundary")
 """The types of relations that are outlines."""
 
+_UNNAMED: Final = -(2**62)
+_NO_KIND: Final = frozenset({"type", "source", "created_by", "note", "fixme"})
+"""Tags of a relation that do not say what it is."""
+
 Places = list[tuple[float, float]]
 _Way = tuple[Tags, list[int]]
-_Relation = tuple[Tags, list[int]]
+_Relation = tuple[Tags, list[tuple[int, str]]]
 
 CUT: Final = "ways of which the extract does not have all nodes"
 SHORT: Final = "ways of fewer than two nodes"
+NO_OUTER: Final = "relations without an outer ring"
 INCOMPLETE: Final = "relations of which the extract does not have all ways"
 OPEN: Final = "relations with rings that do not close"
 TOUCHING: Final = "relations with rings that touch or cross, put together from their ways"
@@ -70,7 +75,9 @@ def read_osm(site_map: SiteMap) -> None:
     options.refuse("OpenStreetMap, which is in longitude and latitude", "units", "crs")
     site_map.crs = WGS84
     with _unpacked(path) as plain, errors_of("osmium", path, "OpenStreetMap data"):
-        _Extract(site_map, _deleted(plain)).read(plain)
+        marks = marks_of(plain)
+        with readable(plain, marks) as clean:
+            _Extract(site_map, marks).read(clean)
 
 
 @contextmanager
@@ -110,35 +117,25 @@ def _copy(packed: IO[bytes], plain: IO[bytes], path: Path) -> None:
         plain.write(part)
 
 
-def _deleted(path: Path) -> set[tuple[str, int]]:
-    """Return kinds and ids of the objects that JOSM has marked as deleted, which osmium ignores."""
-    found: set[tuple[str, int]] = set()
-
-    def start(kind: str, attributes: dict[str, str]) -> None:
-        if attributes.get("action") == "delete":
-            found.add((kind, int(attributes.get("id", "0"))))
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    if path.suffix.lower() != ".pbf":
-        with suppress(expat.ExpatError, ValueError), path.open("rb") as file:
-            parser.ParseFile(file)  # osmium refuses a damaged file
-    return found
-
-
 @dataclass
 class _Extract:
     """The objects of an extract.
 
     Attributes:
         site_map: The map to which they are added.
-        deleted: Kinds and ids of the objects that are marked as deleted.
+        marks: What osmium does not read of it.
+        places: Longitude and latitude of nodes, by id, as ways have them.
         lines: Known part of each way, by id.
+        wholes: Ids of the ways of which all is known.
+        unnamed: Ids for the places of nodes without one, which Overpass can leave out.
     """
 
     site_map: SiteMap
-    deleted: set[tuple[str, int]]
+    marks: Marks
+    places: dict[int, tuple[float, float]] = field(default_factory=dict)
     lines: dict[int, Places] = field(default_factory=dict)
+    wholes: set[int] = field(default_factory=set)
+    unnamed: dict[tuple[float, float], int] = field(default_factory=dict)
 
     def read(self, plain: Path) -> None:
         """Collect the objects with tags of the unpacked file, which may be in any order."""
@@ -147,43 +144,59 @@ class _Extract:
         item: Any  # a way or a relation
         for item in osmium.FileProcessor(str(plain), osm.WAY | osm.RELATION):
             kind = "way" if isinstance(item, osm.Way) else "relation"
-            if (kind, item.id) in self.deleted:
+            if (kind, item.id) in self.marks.deleted:
                 continue
             tags: Tags = {tag.k: tag.v for tag in item.tags}
             if kind == "way":
-                ways[item.id] = tags, [node.ref for node in item.nodes]
+                ways[item.id] = tags, [self._node(node) for node in item.nodes]
                 points += len(item.nodes) if tags else 0
             elif tags:
-                members = [each.ref for each in item.members if each.type == "w"]
+                members = [(each.ref, each.role) for each in item.members if each.type == "w"]
                 relations[item.id] = tags, members
             check_count(self.site_map.path, points, MOST_POINTS, "points")
-        places = self._nodes(plain, {node for _, nodes in ways.values() for node in nodes})
+        self._nodes(plain, {node for _, nodes in ways.values() for node in nodes})
         for number in sorted(ways, key=_by_age):
-            self._way(number, *ways[number], places)
+            self._way(number, *ways[number])
+        for number, shape in self.marks.shapes.items():
+            if number not in self.wholes and None not in shape:
+                self.lines[number] = [place for place in shape if place is not None]
+                self.wholes.add(number)
         for number in sorted(relations, key=_by_age):
-            self._relation(f"relation {number}", *relations[number])
+            self._relation(f"relation {number}", *relations[number], ways)
 
-    def _nodes(self, plain: Path, needed: set[int]) -> dict[int, tuple[float, float]]:
-        """Collect the nodes with tags; return longitude and latitude of the needed ones."""
-        places, tagged = dict[int, tuple[float, float]](), dict[int, MapFeature]()
+    def _node(self, node: Any) -> int:
+        """Return the id of a node of a way, whose place the way itself may have."""
+        number = int(node.ref)
+        if node.location.valid():
+            place = node.lon, node.lat
+            if not number:
+                number = self.unnamed.setdefault(place, _UNNAMED - len(self.unnamed))
+            self.places.setdefault(number, place)
+        return number
+
+    def _nodes(self, plain: Path, needed: set[int]) -> None:
+        """Collect the places of the needed nodes, and the nodes with tags."""
+        tagged = dict[int, MapFeature]()
         node: Any
         for node in osmium.FileProcessor(str(plain), osm.NODE):
             if node.id not in needed and not len(node.tags):
                 continue
-            if node.location.valid() and ("node", node.id) not in self.deleted:
-                places[node.id] = node.lon, node.lat
+            if ("node", node.id) in self.marks.deleted:
+                self.places.pop(node.id, None)
+            elif node.location.valid():
+                self.places[node.id] = node.lon, node.lat
                 if tags := {tag.k: tag.v for tag in node.tags}:
                     point = Point(node.lon, node.lat)
                     tagged[node.id] = MapFeature(point, tags, f"node {node.id}")
         for number in sorted(tagged, key=_by_age):
             self.site_map.add(tagged[number])
-        return places
 
-    def _way(
-        self, number: int, tags: Tags, nodes: list[int], known: Mapping[int, tuple[float, float]]
-    ) -> None:
+    def _way(self, number: int, tags: Tags, nodes: list[int]) -> None:
         """Collect a way as an outline if it is closed and not a street, otherwise as a line."""
+        known = self.places
         places = self.lines[number] = [known[node] for node in nodes if node in known]
+        if len(places) == len(nodes):
+            self.wholes.add(number)
         if not tags:
             return
         geometry, fault = _line(places), ""
@@ -193,15 +206,28 @@ class _Extract:
             geometry = Polygon(places)
         self.site_map.add(MapFeature(geometry, tags, f"way {number}", fault))
 
-    def _relation(self, place: str, tags: Tags, ways: list[int]) -> None:
-        """Collect a relation, as an outline if its ways give one."""
-        lines = [LineString(self.lines[each]) for each in ways if len(self.lines.get(each, ())) > 1]
+    def _relation(
+        self, place: str, tags: Tags, members: list[tuple[int, str]], ways: Mapping[int, _Way]
+    ) -> None:
+        """Collect a relation, as an outline if its ways give one.
+
+        One without tags of its own has those of its only outer way, as in old extracts.
+        """
+        lines = [
+            LineString(self.lines[way]) for way, _ in members if len(self.lines.get(way, ())) > 1
+        ]
         geometry: BaseGeometry = shapely.MultiLineString(lines)
+        inner = [way for way, role in members if role == "inner"]
+        outer = [way for way, role in members if role != "inner"]
+        if tags.keys() <= _NO_KIND and inner and len(outer) == 1 and outer[0] in ways:
+            tags = {**ways[outer[0]][0], **tags}
         fault = ""
         if tags.get("type") not in _AREAS:
             fault = "relations that are no outlines"
-        elif any(each not in self.lines for each in ways):
+        elif any(way not in self.wholes for way, _ in members):
             fault = INCOMPLETE
+        elif inner and not outer:
+            fault = NO_OUTER
         else:
             area = shapely.build_area(shapely.GeometryCollection(lines))
             if area.is_empty:

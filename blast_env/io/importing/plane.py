@@ -187,6 +187,16 @@ def is_longitude_latitude(crs: str) -> bool:
     return _system(crs).to_authority() in (("EPSG", "4326"), ("OGC", "CRS84"))
 
 
+def unit_of(crs: str) -> float:
+    """Return the length of the unit of a reference system, m; 1 for longitude and latitude.
+
+    Raises:
+        BlastEnvError: If there is no such system.
+    """
+    system = _system(crs)
+    return float(system.axis_info[0].unit_conversion_factor) if system.is_projected else 1.0
+
+
 def _system(crs: str) -> CRS:
     try:
         system = CRS.from_user_input(crs)

@@ -1,22 +1,20 @@
 """The objects of a map that matter to a site: their roles, and what their tags say of them."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from fnmatch import fnmatchcase
-from math import isfinite
 from types import MappingProxyType
 from typing import Final
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import MAX_TEXT, BlastEnvError, named, quoted, value_text
-from blast_env.io.importing.ledger import Fate, Ledger
+from blast_env.errors import BlastEnvError, named, quoted, value_text
+from blast_env.io.importing.heights import HeightReader
+from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.lengths import length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
-from blast_env.values import typed_number
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
 
@@ -45,7 +43,8 @@ class Thing:
         height_m: Its height, m, if the source has one.
         protected: Whether the source marks it as protected.
         tnt_kg: Mass of a charge there, if the source has one.
-        kind: The value of `building` or `man_made`, or the layer.
+        kind: The value of `building` or `man_made`, in files of blast-env its kind, or the layer of
+            a drawing; `roof` of a building without walls.
         part_of: The building of which it is a part: its place in the file, or its name in files of
             blast-env.
         base_m: Height of its underside above the ground, m.
@@ -162,9 +161,26 @@ _WALLS: Final = frozenset(
 """Values of OpenStreetMap's `barrier` of solid obstacles, which an import does not make."""
 
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
-_YES: Final = (True, "yes", "true")
-_NO: Final = ("no", "false")
+_YES: Final = ("yes", "true", "1")
+_NO: Final = ("no", "false", "none", "0", "")
 _BELOW: Final = ("underground", "subsurface")
+_ABOVE: Final = ("roof", "rooftop", "indoor")
+_PASSAGE: Final = "building_passage"
+
+_BUILDING_KEYS: Final = ("building", "building:part", "disused:building", "abandoned:building")
+"""Keys of what stands. Other prefixes of the life cycle, as in `demolished:building`, do not."""
+
+_NOT_STANDING: Final = frozenset(
+    ("proposed", "planned", "construction", "demolished", "razed", "removed", "destroyed")
+)
+"""Values of `building`, and keys of a building, of what does not stand."""
+
+_OPEN_GROUND: Final = (
+    *("natural", "landuse", "leisure", "waterway", "boundary", "place", "railway", "barrier"),
+    *("power", "route", "aeroway"),
+)
+"""Keys of outlines that are no buildings, even if a map marks none."""
+
 _NOT_ON_GROUND: Final = (*_BELOW, "rooftop", "multi-storey", "sheds", "garage_boxes")
 _CHIEF_KEYS: Final = (
     *("amenity", "shop", "office", "natural", "landuse", "leisure", "highway", "barrier"),
@@ -175,17 +191,6 @@ _CHIEF_KEYS: Final = (
 _LANE_M: Final = 3.0
 _NARROW: Final = frozenset({"service", "track", "living_street"})
 _WIDTHS: Final = "widths of streets not in the file"
-
-_HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
-_BASE_KEYS: Final = ("min_height", "building:min_height", "base_m")
-_BASE_LEVEL_KEYS: Final = ("building:min_level", "min_level")
-_LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
-
-_LENGTH: Final = re.compile(r"([0-9]+(?:[.,][0-9]*)?)\s*(m|metres|meters|ft|feet|')?")
-_FEET_AND_INCHES: Final = re.compile(r"([0-9]+)\s*(?:'|ft)\s*([0-9]+(?:\.[0-9]*)?)\s*(?:\"|''|in)?")
-_SEVERAL: Final = re.compile(r"[0-9.]+(?:\s*[;/-]\s*[0-9.]+)+")
-_FOOT_M: Final = 0.3048
-_INCH_M: Final = 0.0254
 
 
 def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
@@ -198,16 +203,21 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
     Raises:
         BlastEnvError: If a selector chooses nothing.
     """
-    selectors = _selectors(site_map)
+    selectors, reader = _selectors(site_map), HeightReader.of(site_map)
     roles = [_role(each, selectors, site_map) for each in site_map.features]
-    known = ("kind", "building", "highway", "layer")
+    known = ("kind", "highway", "layer", *_BUILDING_KEYS)
     if not selectors and not any(key in each.tags for each in site_map.features for key in known):
-        outlines = (_is_outline(each.geometry) for each in site_map.features)
-        roles = [Role.BUILDING if is_outline else None for is_outline in outlines]
+        roles = [Role.BUILDING if _may_be_building(each) else None for each in site_map.features]
+    wholes = {
+        str(feature.tags["id"]): feature.place
+        for feature, role in zip(site_map.features, roles, strict=True)
+        if role is Role.BUILDING and "id" in feature.tags and not _is_part(feature.tags)
+    }
     found = []
     for feature, role in zip(site_map.features, roles, strict=True):
         if role is not None:
-            found.append(_thing(feature, role, site_map))
+            whole = wholes.get(str(feature.tags.get("building_id", "")), "")
+            found.append(_thing(feature, role, reader, whole))
         elif str(feature.tags.get("barrier", "")).lower() in _WALLS:
             fault = "walls of the map, which shield"
             found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
@@ -245,41 +255,72 @@ def _role(
             if site_map.has_layers and feature.tags.get("text"):
                 return Role.NAME  # a text on the layer of the object that it names
             return role
-    usual = _usual_role(feature)
+    usual = _usual_role(feature, site_map.has_layers)
     return None if usual in selectors else usual
 
 
-def _usual_role(feature: MapFeature) -> Role | None:
+def _usual_role(feature: MapFeature, has_layers: bool) -> Role | None:
     tags = feature.tags
-    own = str(tags.get("kind", tags.get("layer", ""))).lower()
+    own = _own_kind(tags, has_layers)
     if own in _KINDS:
         return Role.NAME if tags.get("text") else _KINDS[own]
-    if _says(tags, "building") or _says(tags, "building:part"):
+    if any(_says(tags, key) for key in _BUILDING_KEYS):
         return Role.BUILDING
-    if str(tags.get("man_made", "")).lower() in _ROUND:
+    if _word(tags, "man_made") in _ROUND:
         return Role.BUILDING
-    if str(tags.get("highway", "")).lower() in _ROADS and not _says(tags, "tunnel"):
+    is_passage = _word(tags, "tunnel") == _PASSAGE
+    if _word(tags, "highway") in _ROADS and (is_passage or not _says(tags, "tunnel")):
         return Role.CHARGE
-    if str(tags.get("amenity", "")).lower() == "parking" and feature.geometry.area > 0.0:
+    if _word(tags, "amenity") == "parking" and feature.geometry.area > 0.0:
         return Role.CHARGE
     return Role.NAME if tags.get("text") else None
 
 
+def _own_kind(tags: Tags, has_layers: bool) -> str:
+    """Return the kind in a file of blast-env, or the layer of a drawing.
+
+    The tag `layer` of a map says only what is above what.
+    """
+    return _word(tags, "layer" if has_layers else "kind")
+
+
+def _word(tags: Tags, key: str) -> str:
+    return str(tags.get(key, "")).lower()
+
+
 def _says(tags: Tags, key: str) -> bool:
-    return str(tags.get(key, "no")).lower() not in _NO
+    return _word(tags, key) not in _NO
 
 
-def _thing(feature: MapFeature, role: Role, site_map: SiteMap) -> Thing:
-    tags = feature.tags
-    own = str(tags.get("kind", tags.get("layer", ""))).lower()
-    tnt_kg = tags.get("tnt_kg")
+def _is_part(tags: Tags) -> bool:
+    return "building:part" in tags and not _says(tags, "building")
+
+
+def _may_be_building(feature: MapFeature) -> bool:
+    """Return whether an object of a map that marks nothing may be a building."""
+    return _is_outline(feature.geometry) and not any(key in feature.tags for key in _OPEN_GROUND)
+
+
+def _kind(tags: Tags, own: str) -> str:
+    """Return the kind of a building; see `Thing`."""
+    if own in _KINDS:
+        return own
+    if _word(tags, "wall") == "no" or _word(tags, "walls") == "no":
+        return "roof"
+    keys = (*_BUILDING_KEYS, "man_made")
+    return next((_word(tags, key) for key in keys if _says(tags, key)), own)
+
+
+def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) -> Thing:
+    tags, ledger, has_layers = feature.tags, reader.site_map.ledger, reader.site_map.has_layers
+    own = _own_kind(tags, has_layers)
     name_keys = ("title", *_NAME_KEYS) if own in _OWN_STRUCTURES else _NAME_KEYS
     is_building = role is Role.BUILDING
-    top_m, base_m = _heights_m(feature, site_map) if is_building else (None, 0.0)
-    building = str(tags.get("building", tags.get("building:part", "")))
-    kind = building if is_building and not own else own
-    if is_building and not building:
-        kind = str(tags.get("man_made", own)).lower()
+    top_m, base_m = reader.heights_m(feature) if is_building else (None, 0.0)
+    tnt_kg = length_m(tags["tnt_kg"]) if "tnt_kg" in tags else None
+    if "tnt_kg" in tags and role is Role.CHARGE and not tnt_kg:
+        kind, detail = "masses that cannot be read, --tnt-kg", value_text(tags["tnt_kg"])
+        ledger.add(Fate.GUESSED, kind, feature.place, detail=f"tnt_kg is {detail}")
     return Thing(
         role=role,
         geometry=feature.geometry,
@@ -287,129 +328,73 @@ def _thing(feature: MapFeature, role: Role, site_map: SiteMap) -> Thing:
         place=feature.place,
         height_m=top_m,
         base_m=base_m,
-        diameter_m=_diameter_m(feature) if is_building else None,
-        protected=own == "protected_structure" or tags.get("protected") in _YES,
-        part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
-        carries=own == "terrace" or tags.get("carries") in _YES,
-        tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
-        kind=kind.lower(),
-        width_m=_width_m(feature, site_map.ledger) if role is Role.CHARGE else None,
+        diameter_m=_diameter_m(feature, reader.unit_m) if is_building else None,
+        protected=own == "protected_structure" or _word(tags, "protected") in _YES,
+        part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else whole,
+        carries=own == "terrace" or _word(tags, "carries") in _YES,
+        tnt_kg=tnt_kg or None,
+        kind=_kind(tags, own) if is_building else own,
+        width_m=_width_m(feature, reader) if role is Role.CHARGE else None,
         facade=feature.facade,
-        is_part="building:part" in tags and not _says(tags, "building"),
-        fault=_fault(feature, role),
+        is_part=_is_part(tags),
+        fault=_fault(feature, role, has_layers),
     )
 
 
-def _fault(feature: MapFeature, role: Role) -> str:
+def _fault(feature: MapFeature, role: Role, has_layers: bool) -> str:
     """Return why an object cannot be used; an empty string if it can."""
     tags = feature.tags
     if feature.fault:
         return feature.fault
-    is_below = str(tags.get("location", "")).lower() in _BELOW
-    if role in (Role.BUILDING, Role.CHARGE) and "kind" not in tags:
-        with suppress(ValueError):  # the layer of a drawing is a name
-            is_below = is_below or float(str(tags.get("layer", "0"))) < 0.0
+    is_below = _word(tags, "location") in _BELOW
+    if not has_layers and _own_kind(tags, has_layers) not in _KINDS:
+        is_below = is_below or _word(tags, "layer").startswith("-")
     is_point = feature.geometry.geom_type in ("Point", "MultiPoint")
     if role in (Role.ZONE, Role.KEEP_OUT) and is_point:
         return "build zones and no-build areas without an outline"
     if role is Role.BUILDING:
         if is_below:
             return "buildings below the ground"
-        if is_point and _diameter_m(feature) is None:
+        if _word(tags, "location") in _ABOVE:
+            return "buildings on or in others"
+        gone = {key for key in (*_NOT_STANDING, "ruins:building") if _says(tags, key)}
+        if gone or _word(tags, "building") in _NOT_STANDING:
+            return "buildings that are planned, under construction or gone"
+        if is_point and _diameter_m(feature, 1.0) is None:
             return "buildings without an outline or a diameter"
     if role is Role.CHARGE:
         if is_below:
             return "streets and car parks below the ground"
-        if str(tags.get("parking", "")).lower() in _NOT_ON_GROUND:
+        if _word(tags, "parking") in _NOT_ON_GROUND:
             return "car parks that are not on the ground"
     return ""
 
 
-def _diameter_m(feature: MapFeature) -> float | None:
+def _diameter_m(feature: MapFeature, unit_m: float) -> float | None:
     """Return the diameter of a point, m, if the source has one."""
     if feature.geometry.geom_type != "Point":
         return None
-    given = next((feature.tags[key] for key in _DIAMETER_KEYS if key in feature.tags), None)
-    return None if given is None else length_m(given)
+    key = next((key for key in _DIAMETER_KEYS if key in feature.tags), None)
+    if key is None:
+        return None
+    return length_m(feature.tags[key], 1.0 if key.endswith("_m") else unit_m) or None
 
 
-def _width_m(feature: MapFeature, ledger: Ledger) -> float | None:
+def _width_m(feature: MapFeature, reader: HeightReader) -> float | None:
     """Return the width of a street, m; `None` for other places of charges."""
-    road = str(feature.tags.get("highway", "")).lower()
+    road = _word(feature.tags, "highway")
     if not road or _is_outline(feature.geometry):
         return None
-    width_m = length_m(feature.tags.get("width", ""))
-    if width_m is not None:
+    width_m = length_m(feature.tags.get("width", ""), reader.unit_m)
+    if width_m:
         return width_m
     lanes = length_m(feature.tags.get("lanes", ""))
     width_m = _LANE_M * (lanes or (1 if road in _NARROW else 2))
-    if lanes is None:
-        ledger.add(Fate.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {named(road)}")
+    if not lanes:
+        detail = f"{width_m:g} m as {named(road)}"
+        reader.site_map.ledger.add(Fate.GUESSED, _WIDTHS, feature.place, detail=detail)
     return width_m
 
 
 def _is_outline(geometry: BaseGeometry) -> bool:
     return geometry.geom_type in ("Polygon", "MultiPolygon")
-
-
-def _heights_m(feature: MapFeature, site_map: SiteMap) -> tuple[float | None, float]:
-    """Return the heights of top and underside in the tags of an object, m.
-
-    The top is `None` if it is not known. The ledger gets heights that are unclear. An unreadable
-    height does not hide a number of storeys. Of several numbers the largest counts.
-    """
-    own, level_m = site_map.options.height_from, site_map.options.level_height_m
-    tags = {str(name).lower(): value for name, value in feature.tags.items()}
-    lower, ledger = replace(feature, tags=tags), site_map.ledger
-    if own is not None:
-        top_m = _first_m(lower, (own.lower(),), 1.0, ledger)
-    else:
-        top_m = _first_m(lower, _HEIGHT_KEYS, 1.0, ledger)
-        top_m = top_m or _first_m(lower, _LEVEL_KEYS, level_m, ledger)
-    base_m = _first_m(lower, _BASE_KEYS, 1.0, ledger)
-    return top_m, base_m or _first_m(lower, _BASE_LEVEL_KEYS, level_m, ledger) or 0.0
-
-
-def _first_m(
-    feature: MapFeature, keys: Sequence[str], unit_m: float, ledger: Ledger
-) -> float | None:
-    """Return the first readable height of some tags, which are in lower case, m."""
-    for key in keys:
-        if key not in feature.tags:
-            continue
-        value = feature.tags[key]
-        number = length_m(value)
-        if number is None and isinstance(value, str) and _SEVERAL.fullmatch(value.strip()):
-            numbers = [length_m(each) for each in re.split(r"[;/-]", value[:MAX_TEXT])]
-            number = max((each for each in numbers if each), default=None)
-            detail = f"{key} is {value_text(value)}, the largest counts"
-            ledger.add(Fate.GUESSED, "heights of several numbers", feature.place, detail=detail)
-        if number is not None:
-            return number * unit_m
-        is_base = key in (*_BASE_KEYS, *_BASE_LEVEL_KEYS)
-        if not is_base or str(value) not in ("0", "0.0", "0 m"):
-            detail = f"{key} is {value_text(value)}, which is no length in m or ft"
-            ledger.add(Fate.GUESSED, "heights that cannot be read", feature.place, detail=detail)
-    return None
-
-
-def length_m(value: str | float | bool) -> float | None:
-    """Return a length above 0 in metres, or `None` if the value is not one."""
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, str):
-        text = value[:MAX_TEXT].strip()
-        parts = _FEET_AND_INCHES.fullmatch(text)
-        match = _LENGTH.fullmatch(text)
-        try:
-            if parts is not None:
-                feet, inches = (typed_number("a length", parts[k]) for k in (1, 2))
-                value = feet * _FOOT_M + inches * _INCH_M
-            elif match is not None:
-                metric = match[2] is None or match[2].startswith("m")
-                value = typed_number("a length", match[1]) * (1.0 if metric else _FOOT_M)
-            else:
-                return None
-        except BlastEnvError:
-            return None
-    return float(value) if isfinite(value) and value > 0.0 else None
