@@ -18,6 +18,7 @@ from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
+from blast_env.hashing import Hashed
 from blast_env.problems import Problem, ScenarioError, unknown_name
 from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
@@ -33,10 +34,6 @@ BaseWidth = Annotated[StrictFloat, Field(ge=0.01, le=20.0)]
 Friction = Annotated[StrictFloat, Field(ge=0.0, le=2.0)]
 Anchorage = Annotated[StrictFloat, Field(ge=0.0, le=1e9)]
 _FILE: Final = "barriers.toml"
-
-
-RIGID_KEYS: Final = ("mass_kg", "base_width_m", "friction", "anchorage_n")
-"""Keys of an item that decide its stability under a blast; no load depends on them."""
 
 
 class Barrier(SparseSection):
@@ -56,18 +53,20 @@ class Barrier(SparseSection):
         anchorage_n: Horizontal capacity of the anchors of a piece, N; none unless given.
     """
 
-    sparse: ClassVar = frozenset({*RIGID_KEYS, "crash_rating"})
+    sparse: ClassVar = frozenset(
+        {"mass_kg", "base_width_m", "friction", "anchorage_n", "crash_rating"}
+    )
 
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
     length_modules: Count
     thickness_modules: Count = 1
     height_m: Height
     cost: Cost
     rotatable: StrictBool = True
     stops_vehicles: StrictBool = True
-    mass_kg: Mass | None = None
-    base_width_m: BaseWidth | None = None
-    anchorage_n: Anchorage | None = None
+    mass_kg: Annotated[Mass | None, Hashed.NEVER] = None
+    base_width_m: Annotated[BaseWidth | None, Hashed.NEVER] = None
+    anchorage_n: Annotated[Anchorage | None, Hashed.NEVER] = None
 
 
 class StockBarrier(Barrier):
@@ -112,8 +111,8 @@ class Item(Barrier):
 
     name: Name
     stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
-    friction: Friction | None = None
-    crash_rating: CrashRating | None = None
+    friction: Annotated[Friction | None, Hashed.NEVER] = None
+    crash_rating: Annotated[CrashRating | None, Hashed.IF_SET] = None
     from_catalogue: Annotated[str | None, Field(exclude=True)] = None
 
     @model_validator(mode="before")
@@ -187,7 +186,7 @@ class Hardening(FacadePart):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
     structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)] | None = None
     cost: Cost
 
@@ -218,7 +217,7 @@ class Demolition(Section):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
     structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
     cost: Cost
 

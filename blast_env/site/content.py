@@ -6,6 +6,7 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.geometry import Element, Rectangle
+from blast_env.hashing import Hashed
 from blast_env.response.components import Component
 from blast_env.sections import FOR_PEOPLE, Name, Section, Site
 from blast_env.site.heights import default_air_height_m
@@ -41,25 +42,26 @@ def _check_version(version: int) -> int:
 class Content(Section):
     """The sections of a scenario; see `Scenario`."""
 
-    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
-    name: Name
-    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version), Hashed.NEVER]
+    name: Annotated[Name, Hashed.NEVER]
+    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE, Hashed.NEVER] = ""
     import_notes: Annotated[
         tuple[Annotated[str, Field(max_length=MOST_NOTE), FOR_PEOPLE], ...],
         Field(max_length=MOST_NOTES),
+        Hashed.NEVER,
     ] = ()
     site: Site
     charge: Sources
     structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
     build_zone: BuildZone | None = None
-    simulation: SimulationSection = SimulationSection()
+    simulation: Annotated[SimulationSection, Hashed.NEVER] = SimulationSection()
     calibration: Name | None = None
-    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
-    objective: ObjectiveSection = ObjectiveSection()
-    georeference: AnyGeoreference | None = None
-    components: Annotated[dict[Name, Component], Field(max_length=100)] = Field(
-        default_factory=dict
-    )
+    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100), Hashed.IF_SET] = ()
+    objective: Annotated[ObjectiveSection, Hashed.IF_SET] = ObjectiveSection()
+    georeference: Annotated[AnyGeoreference | None, Hashed.NEVER] = None
+    components: Annotated[
+        dict[Name, Component], Field(max_length=100), Hashed.IF_SET, Hashed.IF_RESPONSE
+    ] = Field(default_factory=dict)
 
     @property
     def parameters(self) -> SimulationParameters:

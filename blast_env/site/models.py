@@ -4,15 +4,12 @@ All lengths are in metres, x to the right and y upwards from the lower left corn
 heights are above the ground.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from hashlib import sha256
 from typing import Any, Final, Self
 
 import numpy as np
 from pydantic import (
-    BaseModel,
     TypeAdapter,
     ValidationError,
     model_validator,
@@ -20,12 +17,13 @@ from pydantic import (
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
+from blast_env.hashing import Hashed, digest_of, fields_with, hashed_content
 from blast_env.problems import Problem, ScenarioError, problems_from
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
 from blast_env.site.blast_site import Charge
-from blast_env.site.catalogue import RIGID_KEYS, Hardening
+from blast_env.site.catalogue import Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems
 from blast_env.site.content import Content, Sources
 from blast_env.site.facade import NamedBay, named_bays
@@ -43,31 +41,6 @@ from blast_env.site.zone import (
     BuildZone,
 )
 from blast_env.units import MODULE_SIDE_M
-
-_OPTIONAL: Final[Mapping[str, tuple[str, ...]]] = {
-    "scenario": ("gauges", "objective"),
-    "charge": ("height_m",),
-    "structures": ("height_m", "base_m", "carries", "faces", "peak_weight", "facade"),
-    "objective": ("kind", "measure", "target"),
-    "build_zone": (
-        *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
-        *("hardening", "removable"),
-    ),
-    "access_way": ("gate",),
-}
-"""Keys by section that the hashes leave out where they have their default values."""
-
-_NO_INFLUENCE: Final = {
-    *("name", "description", "import_notes", "simulation", "georeference", "components")
-}
-"""Sections that the hash ignores; it has the parameters of `simulation` instead, and the components
-if the response of facades counts."""
-
-_BUILT: Final = {
-    *("kind", "name", "corner_m", "rows", "columns", "side_modules"),
-    *("height_m", "base_m", "carries", "outline_m", "courtyards_m"),
-}
-"""Keys of a structure for its shape and place."""
 
 
 class Scenario(Content):
@@ -173,42 +146,14 @@ class Scenario(Content):
         buildings, data for the stability of barriers, georeference, order of keys, or the form
         (preset or overrides) of the simulation parameters.
         """
-        content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
-        for structure in content["structures"]:
-            structure.pop("building", None)
-            structure.pop("title")
-            if not self.objective.is_response:
-                structure.pop("facade", None)
-            elif structure["facade"]:
-                for key in ("storeys", "pane_width_m", "pane_height_m"):
-                    if structure["facade"][key] is None:
-                        del structure["facade"][key]
-        if self.objective.is_response and self.components:
-            words = {"title", "source"}
-            content["components"] = {
-                name: each.model_dump(mode="json", exclude=words)
-                for name, each in self.components.items()
-            }
+        left_out = () if self.objective.is_response else (Hashed.IF_RESPONSE,)
+        content = hashed_content(self, *left_out)
         content["schema_version"] = 1
-        _omit_defaults(content, self, "scenario")
-        if "objective" in content:
-            del content["objective"]["target_probability"]  # of judgements; no load depends on it
-            _omit_defaults(content["objective"], self.objective, "objective")
-        for key in ("charge", "structures"):
-            for table, section in zip(content[key], getattr(self, key), strict=True):
-                table.pop("threat", None)
-                _omit_defaults(table, section, key)
+        content["parameters"] = self.parameters.model_dump(mode="json")
         default_m = default_air_height_m(self.structures, self.build_zone)
         if self.site.air_height_m in (None, default_m):
             del content["site"]["air_height_m"]
-        if self.build_zone is not None:
-            content["build_zone"] = _without_words(self.build_zone)
-        for source in content["charge"]:
-            slow = (source.get("motion") or {}).get("slow", ())
-            for area in (*source.get("keep_outs", ()), *slow):
-                del area["reason"]
-        content["parameters"] = self.parameters.model_dump(mode="json")
-        return _digest(content)
+        return digest_of(content)
 
     @property
     def site_hash(self) -> str:
@@ -217,11 +162,13 @@ class Scenario(Content):
         It does not depend on charges, objective, budget and facades, nor on protection, weights
         and faces of structures.
         """
-        zone = None if self.build_zone is None else _without_words(self.build_zone)
-        if zone is not None:
-            zone.pop("budget", None)
-        built = [each.model_dump(mode="json", include=_BUILT) for each in self.structures]
-        return _digest({"build_zone": zone, "structures": built})
+        zone = self.build_zone
+        built = [
+            each.model_dump(mode="json", include=fields_with(type(each), Hashed.OF_PLACES))
+            for each in self.structures
+        ]
+        content = None if zone is None else hashed_content(zone, Hashed.NOT_OF_PLACES)
+        return digest_of({"build_zone": content, "structures": built})
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any], source: str) -> "Scenario":
@@ -412,52 +359,3 @@ class Scenario(Content):
 
 
 _SOURCES: Final = TypeAdapter(Sources)
-
-
-def _digest(content: dict[str, Any]) -> str:
-    text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
-    return sha256(text.encode()).hexdigest()
-
-
-def _without_words(zone: BuildZone) -> dict[str, Any]:
-    """Return the content of a zone without texts for readers and defaults of optional keys."""
-    content = zone.model_dump(mode="json", exclude={"currency"})
-    for area in (*content["keep_outs"], *content["cost_areas"]):
-        del area["reason"]
-    for item in content["items"]:
-        for key in ("description", *RIGID_KEYS):
-            item.pop(key, None)
-        _without_test(item)
-    for measure in (*content["hardening"], *content["removable"]):
-        del measure["description"]
-    if zone.access_way is not None:
-        if zone.access_way.gate is not None:
-            _without_test(content["access_way"]["gate"])
-        _omit_defaults(content["access_way"], zone.access_way, "access_way")
-    _omit_defaults(content, zone, "build_zone")
-    return content
-
-
-def _omit_defaults(content: dict[str, Any], section: BaseModel, name: str) -> None:
-    """Remove the optional keys of a section that have their default values."""
-    for key in _OPTIONAL[name]:
-        field = type(section).model_fields[key]
-        if getattr(section, key) == field.get_default(call_default_factory=True):
-            content.pop(key, None)
-
-
-def _without_test(content: dict[str, Any]) -> None:
-    """Remove what no result depends on from a crash rating, or the key of a missing one."""
-    if content.get("crash_rating") is None:
-        content.pop("crash_rating", None)
-    else:
-        del content["crash_rating"]["test"], content["crash_rating"]["measured_from"]
-
-
-def _without_negative_zero(value: Any) -> Any:
-    """Return nested values with every -0.0 replaced by 0.0, which is the same place on a site."""
-    if isinstance(value, dict):
-        return {key: _without_negative_zero(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_without_negative_zero(item) for item in value]
-    return value + 0.0 if isinstance(value, float) else value

@@ -13,6 +13,7 @@ from pydantic import (
 )
 
 from blast_env.geometry import Cell, Rectangle, WallName
+from blast_env.hashing import Hashed
 from blast_env.problems import (
     Problem,
     ScenarioError,
@@ -79,11 +80,11 @@ class FacadeSection(Section):
     """
 
     storey_m: Annotated[StrictFloat, Field(ge=2.0, le=20.0)] = STOREY_M
-    storeys: Annotated[StrictInt, Field(ge=1, le=200)] | None = None
+    storeys: Annotated[Annotated[StrictInt, Field(ge=1, le=200)] | None, Hashed.IF_SET] = None
     bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
     glazing: Name | None = None
-    pane_width_m: PaneSide | None = None
-    pane_height_m: PaneSide | None = None
+    pane_width_m: Annotated[PaneSide | None, Hashed.IF_SET] = None
+    pane_height_m: Annotated[PaneSide | None, Hashed.IF_SET] = None
     wall: Name | None = None
     parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
 
@@ -143,22 +144,25 @@ class StructureSection(Section):
         facade: The components of its walls; no load depends on it.
     """
 
-    name: Name
+    name: Annotated[Name, Hashed.OF_PLACES]
     protected: StrictBool = False
     weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
-    peak_weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None = None
+    peak_weight: Annotated[Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None, Hashed.IF_SET] = (
+        None
+    )
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-    height_m: Height | None = None
-    base_m: Coordinate = 0.0
-    carries: StrictBool = False
+    height_m: Annotated[Height | None, Hashed.IF_SET, Hashed.OF_PLACES] = None
+    base_m: Annotated[Coordinate, Hashed.IF_SET, Hashed.OF_PLACES] = 0.0
+    carries: Annotated[StrictBool, Hashed.IF_SET, Hashed.OF_PLACES] = False
     faces: Annotated[
         tuple[WallName, ...],
         Field(min_length=1, max_length=len(WALLS)),
         AfterValidator(_check_faces),
+        Hashed.IF_SET,
     ] = WALLS
-    building: Name | None = None
-    title: Annotated[str, Field(max_length=100), FOR_PEOPLE] = ""
-    facade: FacadeSection | None = None
+    building: Annotated[Name | None, Hashed.NEVER] = None
+    title: Annotated[str, Field(max_length=100), FOR_PEOPLE, Hashed.NEVER] = ""
+    facade: Annotated[FacadeSection | None, Hashed.IF_SET, Hashed.IF_RESPONSE] = None
 
     @property
     def lets_through(self) -> bool:
@@ -189,10 +193,10 @@ class StructureSection(Section):
 class ModularObstacleSection(StructureSection):
     """A `ModularObstacle`: a rectangle of rows x columns modules."""
 
-    kind: Literal["ModularObstacle"]
-    corner_m: PointM
-    rows: Count
-    columns: Count
+    kind: Annotated[Literal["ModularObstacle"], Hashed.OF_PLACES]
+    corner_m: Annotated[PointM, Hashed.OF_PLACES]
+    rows: Annotated[Count, Hashed.OF_PLACES]
+    columns: Annotated[Count, Hashed.OF_PLACES]
 
     @property
     def modules(self) -> int:
@@ -214,9 +218,9 @@ class ModularObstacleSection(StructureSection):
 class ConcreteSquareSection(StructureSection):
     """A `ConcreteSquare`: a square of modules."""
 
-    kind: Literal["ConcreteSquare"]
-    corner_m: PointM
-    side_modules: Count
+    kind: Annotated[Literal["ConcreteSquare"], Hashed.OF_PLACES]
+    corner_m: Annotated[PointM, Hashed.OF_PLACES]
+    side_modules: Annotated[Count, Hashed.OF_PLACES]
 
     @property
     def modules(self) -> int:
@@ -257,9 +261,9 @@ class PolygonSection(StructureSection):
         courtyards_m: Corners of each of its courtyards.
     """
 
-    kind: Literal["polygon"]
-    outline_m: Corners
-    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100)] = ()
+    kind: Annotated[Literal["polygon"], Hashed.OF_PLACES]
+    outline_m: Annotated[Corners, Hashed.OF_PLACES]
+    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100), Hashed.OF_PLACES] = ()
 
     @model_validator(mode="after")
     def _check_rings(self) -> Self:

@@ -28,6 +28,7 @@ from blast_env.geometry import (
     overlapping,
     overlapping_any,
 )
+from blast_env.hashing import Hashed
 from blast_env.response.barriers import RigidPiece
 from blast_env.sections import FOR_PEOPLE, Area, Height, PointM, Section, Site, SparseSection
 from blast_env.site.catalogue import (
@@ -104,19 +105,21 @@ class BuildZone(Section):
     corner_m: PointM
     rows: Count
     columns: Count
-    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
-    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS)] = ()
-    removable: Annotated[tuple[Demolition, ...], Field(max_length=MOST_ITEMS)] = ()
+    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
+    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
+    removable: Annotated[tuple[Demolition, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
     stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-    clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0)] = 0.0
-    module_cost: Cost = 1.0
-    cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100)] = ()
-    budget: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-    currency: Annotated[str, Field(max_length=20), FOR_PEOPLE] = ""
-    access_way: AccessWay | None = None
-    height_m: Height | None = None
+    clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0), Hashed.IF_SET] = 0.0
+    module_cost: Annotated[Cost, Hashed.IF_SET] = 1.0
+    cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100), Hashed.IF_SET] = ()
+    budget: Annotated[
+        Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None, Hashed.IF_SET, Hashed.NOT_OF_PLACES
+    ] = None
+    currency: Annotated[str, Field(max_length=20), FOR_PEOPLE, Hashed.NEVER] = ""
+    access_way: Annotated[AccessWay | None, Hashed.IF_SET] = None
+    height_m: Annotated[Height | None, Hashed.IF_SET] = None
 
     @model_validator(mode="before")
     @classmethod
