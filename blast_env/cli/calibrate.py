@@ -16,7 +16,7 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import CALIBRATED_ENGINES, find_engine
+from blast_env.evaluation.engines import CALIBRATED_ENGINES, PAPER_ENGINES, find_engine
 from blast_env.files import make_folder
 from blast_env.particles.calibration.laws import LawName, shape_rms_percent
 from blast_env.particles.calibration.model import (
@@ -57,7 +57,7 @@ def calibrate(
         "free_field", help="A scenario with one point charge and one structure."
     ),
     preset: str | None = typer.Option(None, help="Parameters of this name."),
-    engine: str = typer.Option("pymunk", help=_ENGINES),
+    engine: str = typer.Option(PAPER_ENGINES["calibrate"], help=_ENGINES),
     law: LawName = typer.Option(
         "power", help="The law to store: proportional, linear or power.", metavar="LAW"
     ),

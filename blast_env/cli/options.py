@@ -16,7 +16,13 @@ from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_of_each_charge
-from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE, Engine
+from blast_env.evaluation.engines.contract import (
+    CALIBRATED_ENGINES,
+    ENGINE_NAMES,
+    JUDGE,
+    PAPER_ENGINES,
+    Engine,
+)
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.sections import PointM
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
@@ -27,7 +33,7 @@ ENGINE_HELP: Final = (
     f"Engine: {', '.join(ENGINE_NAMES)}. {JUDGE} is gas dynamics, "
     f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
-BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
+BY_SITE: Final = f"{PAPER_ENGINES['train']}, or {JUDGE} where the site states heights"
 CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
     "for search; fine: later, for final results."

@@ -10,12 +10,11 @@ import typer
 
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
-    BY_SITE,
-    ENGINE_HELP,
     UNTIL_HELP,
     CellOption,
     CellsOption,
     ChargeOption,
+    EngineChoice,
     GivenCharge,
     JsonOption,
     LayoutOption,
@@ -33,7 +32,7 @@ from blast_env.cli.output import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import building_words, standing_lines
-from blast_env.evaluation.engines import BlastResult, Engine, default_engine, find_engine
+from blast_env.evaluation.engines import JUDGE, BlastResult, Engine, find_engine
 from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
 from blast_env.evaluation.engines.pieces import pieces_answer
 from blast_env.geometry import Layout, layout_counts
@@ -67,7 +66,7 @@ def simulate(
     scenario: ScenarioArgument,
     layout: LayoutOption = None,
     seed: int = typer.Option(0, help="Decides charge, fan and air.", min=0),
-    engine: str | None = typer.Option(None, help=ENGINE_HELP, show_default=BY_SITE),
+    engine: EngineChoice = JUDGE,
     stand_off_m: float | None = typer.Option(
         None, "--stand-off", help="Distance from charge to facade, m (free_field)."
     ),
@@ -128,8 +127,7 @@ def simulate(
     site = site.with_simulation(preset)
     # A layout belongs to the site of the file, before preset and stand-off change it.
     elements: Layout = () if layout is None else tuple(load_layout(layout, own))
-    name = engine or default_engine(site)
-    used = find_engine(name, cell_m, until=until, cells=cells)
+    used = find_engine(engine, cell_m, until=until, cells=cells)
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")

@@ -159,7 +159,7 @@ def _train(
     if given.get("observation") in _POLICIES:
         changes.setdefault("policy", _POLICIES[given["observation"]])
     site = scenario_source(scenario).representative
-    values = {"engine": default_engine(site, particles="event"), **given}
+    values = {"engine": default_engine("train", site), **given}
     values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
     hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)
     fixed = {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}

@@ -49,7 +49,7 @@ from blast_env.values import real_number, whole_number
 
 
 class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
-    """Barriers are placed one by one to shield a structure; then a charge goes off.
+    """Barriers are placed one by one, then a charge goes off, by default in the paper's model.
 
     ## Description
     Each action puts a barrier module, or a piece of a catalogue, on a cell of the build zone. Then
@@ -157,11 +157,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             invalid_action_cost: Cost of an illegal action without effect, in the unit of the
                 reward; 0.001 psi s are 6.9 Pa s.
             invalid_action_limit: Number of illegal actions without effect that ends the episode.
-            engine: Name of an engine, or an engine; by default `"event"`, and `"gas"` for sites
-                that state heights. `"event"` and `"pymunk"` run the particle model: for studying
-                it, for cheap tests of learning methods, for a first look. `"gas"` is the basis for
-                decisions: no calibration, one realisation per charge, a second or more per blast;
-                there is no `impulse_sim`. `"surrogate"` approximates gas dynamics.
+            engine: Name of an engine, or an engine; by default `"event"`, the paper's model, and
+                `"gas"` for sites that state heights. `"event"` and `"pymunk"` are for studying that
+                model, for cheap tests of learning methods, for a first look. `"gas"` is the basis
+                for decisions: no calibration, one realisation per charge, a second or more per
+                blast; there is no `impulse_sim`. `"surrogate"` approximates gas dynamics.
             cell_m: Side of the cells of gas dynamics; default 0.5 m.
             cache: Folder of a store of blasts, which other processes and later runs may use too,
                 or a `BlastStore`; by default blasts are only in memory.
@@ -172,7 +172,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         """
         source = scenario_source(scenario)
         representative = source.representative
-        found = find_engine(engine or default_engine(representative, particles="event"), cell_m)
+        found = find_engine(engine or default_engine("BlastBarrier-v0", representative), cell_m)
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.render_mode = render_mode

@@ -17,7 +17,7 @@ from blast_env.envs.arguments import (
     checked_options,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import Blast, BlastResult, Engine, find_engine
+from blast_env.evaluation.engines import PAPER_ENGINES, Blast, BlastResult, Engine, find_engine
 from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.layout.build_site import draw_threat
@@ -375,7 +375,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     >>> while not ended:
     ...     observation, reward, ended, _, info = env.step(0)
     ...     total += reward
-    >>> result = blast_env.simulate(blast_env.load_scenario("free_field"), seed=0)
+    >>> result = blast_env.simulate("free_field", seed=0, engine="pymunk")
     >>> total == -result.impulse_sim("building") and info["digest"] == result.digest
     True
 
@@ -397,7 +397,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         self,
         scenario: AnyScenario = "courtyard",
         layout: Sequence[Element] = (),
-        engine: str | Engine = "pymunk",
+        engine: str | Engine = PAPER_ENGINES["BlastSimulator-v0"],
         step_s: float = 0.002,
         render_mode: str | None = None,
         cell_m: float | None = None,

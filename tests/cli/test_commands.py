@@ -54,9 +54,11 @@ def test_simulate_prints_loads_with_units_and_writes_all_files(
     layout = tmp_path / "layout.json"
     layout.write_text("[[4, 0], [5, 0]]")
     pairs = [text for pair in zip(options, written, strict=True) for text in pair]
-    result = run("simulate", sparse, "--seed", "3", "--layout", layout, *pairs)
+    result = run(
+        *("simulate", sparse, "--engine", "pymunk", "--seed", "3", "--layout", layout), *pairs
+    )
     assert result.exit_code == 0, result.output
-    blast = simulate(BALLISTIC_COURTYARD, [(4, 0), (5, 0)], seed=3)
+    blast = simulate(BALLISTIC_COURTYARD, [(4, 0), (5, 0)], seed=3, engine="pymunk")
     assert f"{blast.impulse_sim('building'):,.0f}" in result.stdout
     assert "impulse m|v| (sim)" in result.stdout
     assert blast.digest in result.stdout
@@ -86,7 +88,7 @@ def test_an_interruption_leaves_nothing_half_written(
             raise KeyboardInterrupt
 
     monkeypatch.setattr(PymunkRun, "advance", interrupted)
-    result = run("simulate", sparse, "--film", tmp_path / "film.mp4")
+    result = run("simulate", sparse, "--engine", "pymunk", "--film", tmp_path / "film.mp4")
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
     assert list(tmp_path.iterdir()) == []

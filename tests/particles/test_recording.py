@@ -60,13 +60,13 @@ def make_scenario(**overrides: dict[str, Any]) -> Scenario:
 @pytest.fixture(scope="module")
 def blast() -> BlastResult:
     """Two protected structures, a shed and a barrier, all of them hit."""
-    return simulate(make_scenario(), layout=[(3, 0), (4, 0), (5, 1)], seed=SEED)
+    return simulate(make_scenario(), layout=[(3, 0), (4, 0), (5, 1)], seed=SEED, engine="pymunk")
 
 
 @pytest.fixture(scope="module")
 def quiet_blast() -> BlastResult:
     """A run that ends before anything is hit."""
-    return simulate(make_scenario(stepping={"time_limit_s": 1e-4}))
+    return simulate(make_scenario(stepping={"time_limit_s": 1e-4}), engine="pymunk")
 
 
 # ---

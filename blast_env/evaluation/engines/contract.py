@@ -485,14 +485,31 @@ JUDGE: Final = "gas"
 """The engine whose results decide about protection."""
 
 
-def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> str:
-    """Return the name of the default engine of sites.
+PAPER_ENGINES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "BlastBarrier-v0": "event",
+        "BlastBarrierSites-v0": "event",
+        "BlastSimulator-v0": "pymunk",
+        "train": "event",
+        "calibrate": "pymunk",
+    }
+)
+"""The ids and commands of the paper's model, with their engines; everything else takes `JUDGE`."""
 
-    It is gas dynamics if any site has a feature that particles ignore: a height, a catalogue, a
-    raised charge, walls that do not count, a gauge. Otherwise it is the particle model, which was
-    made for sites without such features; `particles` names its engine.
+
+def default_engine(use: str, *scenarios: Scenario) -> str:
+    """Return the name of the engine that runs where none is named.
+
+    It is gas dynamics, except for the ids and commands of the paper's model (`PAPER_ENGINES`).
+    These take gas dynamics too for sites that state heights, which that model would ignore.
+
+    Args:
+        use: The id of an environment, or a command.
+        scenarios: The sites.
     """
-    return JUDGE if any(each.height_notes for each in scenarios) else particles
+    if any(each.height_notes for each in scenarios):
+        return JUDGE
+    return PAPER_ENGINES.get(use, JUDGE)
 
 
 def find_engine(engine: str | Engine, cell_m: float | None = None, **settings: Any) -> Engine:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from blast_env.evaluation.engines.contract import BlastOutcome, Engine, default_engine, find_engine
+from blast_env.evaluation.engines.contract import JUDGE, BlastOutcome, Engine, find_engine
 from blast_env.evaluation.engines.particles import BlastResult, ParticleEngine
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
@@ -18,7 +18,7 @@ def simulate(
     layout: Sequence[Element] = ...,
     seed: int = ...,
     *,
-    engine: "Literal['gas'] | GasEngine",
+    engine: "Literal['gas'] | GasEngine" = ...,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
     **settings: Any,
@@ -42,18 +42,18 @@ def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
-    engine: str | Engine | None = ...,
+    engine: str | Engine = ...,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
     **settings: Any,
-) -> Any: ...  # depends on the site, or on the engine of that name
+) -> Any: ...  # depends on the engine of that name
 
 
 def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = (),
     seed: int = 0,
-    engine: str | Engine | None = None,
+    engine: str | Engine = JUDGE,
     charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
     **settings: Any,
@@ -66,9 +66,8 @@ def simulate(
         scenario: The scenario, or its bundled name or path; see `load_scenario`.
         layout: (row, column) of the build-zone cells that hold a barrier module.
         seed: Draws the charge, where the scenario leaves it open, the fan and the air.
-        engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
-            gas dynamics, `"gas"`, for which the seed only draws the charge. The default depends
-            on the site; see `default_engine`.
+        engine: Name of an engine, or an engine: gas dynamics, `"gas"`, for which the seed only
+            draws the charge, or the particle engines `"pymunk"` and `"event"`.
         charge: The charge, instead of one drawn from the scenario.
         progress: Called periodically with the elapsed share of the time limit.
         settings: Settings of the engine, those of gas dynamics: `cell_m`, the side of its cells,
@@ -91,5 +90,5 @@ def simulate(
     # Values that are not iterable are refused by the reader of the layout.
     elements = tuple(layout) if isinstance(layout, Iterable) else layout
     site = find_scenario(scenario)
-    found = find_engine(default_engine(site) if engine is None else engine, **settings)
+    found = find_engine(engine, **settings)
     return found.blast(site, elements, seed, charge).run(progress)

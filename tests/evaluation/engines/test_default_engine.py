@@ -25,12 +25,19 @@ def run(*arguments: str | Path) -> Result:
     return result
 
 
-def test_heights_take_gas_and_the_papers_sites_particles() -> None:
-    assert default_engine(hut()) == "gas"
-    assert default_engine(load_scenario("courtyard")) == "pymunk"
-    assert default_engine(load_scenario("courtyard"), particles="event") == "event"
-    assert default_engine(load_scenario("courtyard"), hut()) == "gas"
-    assert default_engine() == "pymunk"
+def test_gas_runs_except_in_the_ids_and_commands_of_the_paper_s_model() -> None:
+    flat = load_scenario("courtyard")
+    for use in ("simulate", "evaluate", "search", "BlastBarrierGas-v0"):
+        assert default_engine(use, flat) == "gas"
+    assert default_engine("BlastBarrier-v0", flat) == default_engine("train", flat) == "event"
+    assert default_engine("BlastSimulator-v0", flat) == "pymunk"
+    assert default_engine("calibrate") == "pymunk"
+    assert default_engine("BlastBarrier-v0", flat, hut()) == "gas"
+
+
+def test_a_flat_site_is_simulated_by_gas_too() -> None:
+    result = run("simulate", "courtyard", "--until", "0.001")
+    assert result.stdout.startswith("engine gas")
 
 
 def test_a_site_with_heights_is_simulated_by_gas_and_says_so_first(site: Path) -> None:

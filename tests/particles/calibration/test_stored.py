@@ -106,19 +106,19 @@ def test_other_parameters_and_other_engines_are_refused() -> None:
         CALIBRATION.check(scenario.parameters, "event")
     other = scenario.with_simulation(overrides={"air": {"mass": 0.5}})
     with pytest.raises(CalibrationError, match="preset 'ballistic'"):
-        simulate(other).impulse("building")
+        simulate(other, engine="pymunk").impulse("building")
 
 
 def test_a_scenario_without_a_calibration_says_which_there_are() -> None:
     document = BALLISTIC_COURTYARD.model_dump() | {"calibration": None}
     unprotected = Scenario.from_document(document, "bare")
     with pytest.raises(CalibrationError, match="ballistic_kb_100kg"):
-        simulate(unprotected).impulse("building")
+        simulate(unprotected, engine="pymunk").impulse("building")
     misnamed = Scenario.from_document(document | {"calibration": "balistic_ufc"}, "misnamed")
     with pytest.raises(UnknownNameError, match="did you mean 'ballistic_ufc'"):
-        simulate(misnamed).impulse("building")
+        simulate(misnamed, engine="pymunk").impulse("building")
     with pytest.raises(CalibrationError, match="'barrier' is no structure"):
-        simulate(BALLISTIC_COURTYARD, [(8, 0)]).impulse("barrier")
+        simulate(BALLISTIC_COURTYARD, [(8, 0)], engine="pymunk").impulse("barrier")
 
 
 def test_twice_the_width_is_not_twice_the_load() -> None:
@@ -136,10 +136,14 @@ def test_twice_the_width_is_not_twice_the_load() -> None:
 
 def test_outside_its_cases_it_converts_and_says_so() -> None:
     scenario = BALLISTIC_COURTYARD
-    near = simulate(scenario, charge=Charge((5.0, 15.0), 100.0)).impulse("building")
+    near = simulate(scenario, charge=Charge((5.0, 15.0), 100.0), engine="pymunk").impulse(
+        "building"
+    )
     assert near.in_range
     assert near.notes == ()
-    light = simulate(scenario, charge=Charge((5.0, 15.0), 50.0)).impulse("building")
+    light = simulate(scenario, charge=Charge((5.0, 15.0), 50.0), engine="pymunk").impulse(
+        "building"
+    )
     assert not light.in_range
     assert "charge 50 kg TNT is not 100 kg" in light.notes
     assert light.psi_s > 0.0
@@ -165,7 +169,7 @@ def test_charges_are_related_by_hopkinson_cranz_scaling_where_that_was_checked()
 
 def test_a_calibration_says_which_impulse_it_converts() -> None:
     scenario = BALLISTIC_COURTYARD
-    result = simulate(scenario, seed=1)
+    result = simulate(scenario, seed=1, engine="pymunk")
     other = CALIBRATION.model_copy(update={"simulated": "transferred_impulse"})
     building = result.obstacle("building")
     ratio = building.transferred_impulse / building.impulse
