@@ -42,6 +42,39 @@ def mean_estimate(values: FloatArray) -> Estimate:
     return Estimate(mean, mean - half_width, mean + half_width)
 
 
+def p_value_of_mean(values: FloatArray) -> float:
+    """Return the two-sided p value of Student's t test that the mean is 0.
+
+    Args:
+        values: Values (n,), such as differences of pairs.
+
+    Returns:
+        The p value; 1 for one value, and for values that are all 0.
+    """
+    count, mean = len(values), float(values.mean())
+    if count < 2 or mean == 0.0:
+        return 1.0
+    spread = float(values.std(ddof=1))
+    if spread == 0.0:
+        return 0.0
+    from scipy.special import stdtr  # as in `_half_width`
+
+    return float(2.0 * stdtr(count - 1, -abs(mean) / spread * np.sqrt(count)))
+
+
+def holm_adjusted(p_values: Sequence[float]) -> list[float]:
+    """Return p values adjusted for their number, in their order.
+
+    Holm, A simple sequentially rejective multiple test procedure, Scand. J. Statist. 6 (1979) 65:
+    the k-th smallest of m is multiplied by m - k + 1, and none is below a smaller one's.
+    """
+    order = np.argsort(p_values)
+    factors = np.arange(len(order), 0, -1)
+    adjusted = np.empty(len(order))
+    adjusted[order] = np.maximum.accumulate(np.asarray(p_values)[order] * factors)
+    return [float(value) for value in np.minimum(adjusted, 1.0)]
+
+
 def stratified_estimate(groups: Sequence[tuple[float, Sequence[float]]]) -> Estimate:
     """Return the sum of weighted means of groups, with Student's t interval within the groups.
 

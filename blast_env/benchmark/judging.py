@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from blast_env.arrays import FloatArray
 from blast_env.benchmark.definitions import DEFINITIONS, Definition
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import (
@@ -32,7 +33,7 @@ from blast_env.documents import checked_as, parse_json
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
-from blast_env.statistics import Estimate, mean_estimate, stratified_estimate
+from blast_env.statistics import Estimate, mean_estimate, p_value_of_mean, stratified_estimate
 
 JUDGE_CELL_M: Final = 0.25
 """Side of the judge's cells, m."""
@@ -59,7 +60,10 @@ class JudgedRun(Run):
 
     @property
     def score(self) -> float:
-        """Score: 0 for the best rule or worse, 1 for the best known layout, above 1 if better."""
+        """Score: 0 for the best rule or worse, 1 for the best known layout, above 1 if better.
+
+        It forgets how much worse: `JudgedSubmission.lead` ranks, which does not.
+        """
         gain = self.rule - self.share
         if self.rule - self.best < _SAME:
             return 1.0 if gain > -_SAME else 0.0
@@ -125,10 +129,6 @@ class JudgedSubmission:
         scores = self._by_problem(budget, lambda run: run.score, 0.0)
         return stratified_estimate([(1.0 / len(scores), each) for each in scores])
 
-    def score_over_problems(self, budget: int) -> Estimate:
-        """Return the same with its interval over the problems."""
-        return self._mean(budget, lambda run: run.score, 0.0)
-
     def reduction(self, budget: int) -> Estimate:
         """Return the mean share of the load taken off, with its interval over the problems.
 
@@ -139,6 +139,10 @@ class JudgedSubmission:
     def lead(self, budget: int) -> Estimate:
         """Return `reduction` less that of the best rule of each problem, paired by problem."""
         return self._mean(budget, lambda run: run.rule - run.share, -1.0)
+
+    def lead_p_value(self, budget: int) -> float:
+        """Return the p value of Student's t test over the problems that the lead is 0."""
+        return p_value_of_mean(self._means(budget, lambda run: run.rule - run.share, -1.0))
 
     def _by_problem(
         self, budget: int, value: Callable[[JudgedRun], float], missing: float
@@ -151,8 +155,13 @@ class JudgedSubmission:
         return [each or [missing] for each in found.values()]
 
     def _mean(self, budget: int, value: Callable[[JudgedRun], float], missing: float) -> Estimate:
-        of_problems = self._by_problem(budget, value, missing)
-        return mean_estimate(np.array([np.mean(each) for each in of_problems]))
+        return mean_estimate(self._means(budget, value, missing))
+
+    def _means(
+        self, budget: int, value: Callable[[JudgedRun], float], missing: float
+    ) -> FloatArray:
+        """Return the mean value of the runs with a budget for each problem (problems,)."""
+        return np.array([np.mean(runs) for runs in self._by_problem(budget, value, missing)])
 
 
 def judge(

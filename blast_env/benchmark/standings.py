@@ -8,15 +8,17 @@ import numpy as np
 from blast_env.benchmark.definitions import DEFINITIONS
 from blast_env.benchmark.judging import JudgedSubmission
 from blast_env.evaluation.answers import AnswerTable
-from blast_env.statistics import Estimate
+from blast_env.statistics import Estimate, holm_adjusted
 from blast_env.tables import markdown_table
 from blast_env.values import markup_text
 
 _HEAD = """# Standings
 
-Judged entries to the [benchmark](benchmark.md), with its [score](benchmark.md#score). The files in
-`blast_env/benchmark/data/standings` have the layouts of every run. `blast-env judge --page
-standings.md` writes this page from them. The load is that of gas dynamics; intervals are of 95 %.
+Judged entries to the [benchmark](benchmark.md), ranked by its [points beside the best
+rule](benchmark.md#score). The files in `blast_env/benchmark/data/standings` have the layouts of
+every run. `blast-env judge --page standings.md` writes this page from them. The load is that of gas
+dynamics; intervals are of 95 %. p is the chance of such a difference to the best rule, or a larger
+one, if there is none, corrected for the number of entries (Holm).
 """
 
 _NAMED = 3
@@ -55,28 +57,32 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
 def _table(
     judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float
 ) -> AnswerTable:
-    runs = {run.problem: run for each in judged for run in each.runs}.values()
+    """Return the table of submissions to the same problems, the largest lead first."""
+    runs = {run.problem: run for entry in judged for run in entry.runs}.values()
     rule, best = (
         100.0 * (1.0 - float(np.mean(shares)))
         for shares in ([run.rule for run in runs], [run.best for run in runs])
     )
     found: list[tuple[float, float, tuple[str, ...]]] = [
-        (score, off, (name, "", "", f"{score:.2f}", "", "", f"{off:.1f}", f"{off - rule:+.1f}"))
+        (off - rule, score, (name, "", "", f"{off:.1f}", f"{off - rule:+.1f}", "", f"{score:.2f}"))
         for name, score, off in (("best known", 1.0, best), ("best rule", 0.0, rule))
     ]
-    for each in judged:
-        for budget in sorted({run.budget for run in each.runs}):
-            seeds = len({run.seed for run in each.runs if run.budget == budget})
-            score, over = each.score(budget), each.score_over_problems(budget)
-            taken, lead = (of(budget).scaled(100.0) for of in (each.reduction, each.lead))
-            row = (
-                *(each.method, f"{budget:,}", str(seeds), f"{score.value:.2f}"),
-                *(_ends(of, "{:.2f}") for of in (score, over)),
-                f"{taken.value:.1f}",
-                " ".join((f"{lead.value:+.1f}", _ends(lead, "{:.1f}"))).rstrip(),
-            )
-            found.append((score.value, taken.value, row))
-    found.sort(key=lambda each: (round(each[0], 9), round(each[1], 9)), reverse=True)
+    entries = [
+        (entry, budget) for entry in judged for budget in sorted({run.budget for run in entry.runs})
+    ]
+    chances = holm_adjusted([entry.lead_p_value(budget) for entry, budget in entries])
+    for (entry, budget), chance in zip(entries, chances, strict=True):
+        seeds = len({run.seed for run in entry.runs if run.budget == budget})
+        taken, lead = (of(budget).scaled(100.0) for of in (entry.reduction, entry.lead))
+        score = entry.score(budget)
+        row = (
+            *(entry.method, f"{budget:,}", str(seeds), f"{taken.value:.1f}"),
+            " ".join((f"{lead.value:+.1f}", _ends(lead, "{:.1f}"))).rstrip(),
+            "< 0.001" if chance < 0.001 else f"{chance:.3f}",
+            " ".join((f"{score.value:.2f}", _ends(score, "{:.2f}"))).rstrip(),
+        )
+        found.append((lead.value, score.value, row))
+    found.sort(key=lambda entry: (round(entry[0], 9), round(entry[1], 9)), reverse=True)
     names = ", ".join(problems)
     if set(problems) == set(DEFINITIONS):
         names = "All problems"
@@ -85,8 +91,8 @@ def _table(
     return AnswerTable(
         f"{names}; cells of {cell_m:g} m",
         (
-            *("method", "blasts", "seeds", "score", "over seeds", "over problems"),
-            *("load taken off, %", "beside the best rule, points"),
+            *("method", "blasts", "seeds", "load taken off, %", "beside the best rule, points"),
+            *("p", "score"),
         ),
         tuple(row for *_, row in found),
     )

@@ -35,7 +35,7 @@ from studies.benchmark.references import (
     named_definition,
     published_blasts,
     rescaled,
-    seen_references,
+    seen_rule,
     with_fine_shares,
     with_judged,
     with_published,
@@ -150,21 +150,23 @@ def picture(
     out: Annotated[Path, typer.Argument(help="The file.")] = Path("docs/pictures/scores.png"),
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
 ) -> None:
-    """Draw the mean score over the blasts spent, on the cells and charges of the search."""
+    """Draw the points beside the best rule over the blasts spent, as the searches see them."""
     with user_errors():
         methods = [each for each in shipped_standings() if set(each.problems) == set(DEFINITIONS)]
-        ends = {name: seen_references(name, cache) for name in DEFINITIONS}
+        rules = {name: seen_rule(name, cache) for name in DEFINITIONS}
         figure = Figure(figsize=(8.0, 4.5), layout="constrained")
-        axes = figure.add_subplot(xlabel="blasts", ylabel="score as the search sees it")
+        axes = figure.add_subplot(
+            xlabel="blasts", ylabel="points beside the best rule, as the search sees it"
+        )
         budget, curves = BUDGETS[1], {}
         blasts = np.arange(budget + 1)
         for each in methods:
             runs = [run for run in each.runs if run.budget == budget]
-            curves[each.method] = mean_curve(runs, ends, blasts)
+            curves[each.method] = mean_curve(runs, rules, blasts)
         for index, name in enumerate(sorted(curves, key=lambda each: -curves[each][-1])):
             line = "-" if index < 10 else "--"  # the colours repeat after ten
             axes.step(blasts, curves[name], where="post", label=name, linestyle=line)
-        axes.set_ylim(bottom=0.0)
+        axes.axhline(0.0, color="black", linewidth=0.8)
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
         save_figure(figure, out)

@@ -164,36 +164,33 @@ def with_fine_shares(
     return replace(known, rule=min(rules, key=lambda each: each.shares[fine]), best=best)
 
 
-def seen_references(name: str, cache: Path | None) -> tuple[float, float]:
-    """Return the shares of the best rule and the best known layout as a search sees them.
+def seen_rule(name: str, cache: Path | None) -> float:
+    """Return the share that the best rule leaves as a search sees it.
 
-    A problem whose judge has other charges takes the blasts of both layouts.
+    A problem whose judge has other charges takes the blasts of the layout.
     """
-    problem, known = make(name, 0, cache=cache), stored_references()[name]
-    ends = (known.rule, known.best)
+    problem, rule = make(name, 0, cache=cache), stored_references()[name].rule
     judged = problem.definition.case
-    if {each.charge for each in judged.threats} == {each.charge for each in problem.threats}:
-        rule, best = (each.shares[cell_key(0.5)] for each in ends)
-    else:
-        rule, best = shares_of(problem.case, [each.layout for each in ends], problem.evaluator)
-    return rule, best
+    if {threat.charge for threat in judged.threats} == {
+        threat.charge for threat in problem.threats
+    }:
+        return rule.shares[cell_key(0.5)]
+    (share,) = shares_of(problem.case, [rule.layout], problem.evaluator)
+    return share
 
 
-def mean_curve(
-    runs: Sequence[Run], ends: Mapping[str, tuple[float, float]], blasts: IntArray
-) -> FloatArray:
-    """Return the mean score of runs after numbers of blasts, 0 before their first layout.
+def mean_curve(runs: Sequence[Run], rules: Mapping[str, float], blasts: IntArray) -> FloatArray:
+    """Return the mean points beside the best rule after numbers of blasts, 0 before a layout.
 
     Args:
         runs: The runs.
-        ends: Shares of the load of score 0 and 1, by problem.
+        rules: Share of the load that the best rule leaves, by problem.
         blasts: The numbers (blasts,).
     """
-    scores = []
+    points = []
     for run in runs:
-        rule, best = ends[run.problem]
-        spent, shares = np.array([(0, rule), *run.curve]).T
+        spent, shares = np.array([(0, rules[run.problem]), *run.curve]).T
         by_then = shares[np.searchsorted(spent, blasts, side="right") - 1]
-        scores.append(np.maximum((rule - by_then) / (rule - best), 0.0))
-    mean: FloatArray = np.mean(scores, axis=0)
+        points.append(100.0 * (rules[run.problem] - by_then))
+    mean: FloatArray = np.mean(points, axis=0)
     return mean

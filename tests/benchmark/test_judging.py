@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -107,13 +108,12 @@ def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
     few = replace(judged(run(14, 50), run(14, 50, 1)), method="few")
     best = replace(judged(run(12, 50)), method="best")
     (table,) = standings_tables((few, best))
-    assert [(row[0], row[3], *row[6:]) for row in table.rows] == [
-        ("best known", "1.00", "10.0", "+8.0"),
-        ("best", "1.00", "10.0", "+8.0"),
-        ("few", "0.17", "3.3", "+1.3"),
-        ("best rule", "0.00", "2.0", "+0.0"),
+    assert [(row[0], *row[3:]) for row in table.rows] == [
+        ("best known", "10.0", "+8.0", "", "1.00"),
+        ("best", "10.0", "+8.0", "1.000", "1.00"),
+        ("few", "3.3", "+1.3", "1.000", "0.17 (0.17 to 0.17)"),
+        ("best rule", "2.0", "+0.0", "", "0.00"),
     ]
-    assert table.rows[2][4:6] == ("(0.17 to 0.17)", "")
     page = standings_page((replace(few, note="a | b"), best))
     assert r"| few | a \| b |" in page
     assert f"{NAME}; cells of 0.5 m" in page
@@ -169,10 +169,50 @@ def test_reductions_and_leads_are_over_the_problems() -> None:
     assert both.reduction(0).value == pytest.approx(0.075)
     assert both.lead(0).value == pytest.approx(0.04)
     assert both.lead(0).high - 0.04 == pytest.approx(12.706 * 0.01, rel=1e-4)
-    assert both.score_over_problems(0).high > both.score(0).value
+    assert both.lead_p_value(0) == pytest.approx(2.0 * np.arctan(1.0 / 4.0) / np.pi)
     assert both.score(50).value == both.reduction(50).value == 0.0
     (table,) = standings_tables([both])
-    assert table.rows[1][-2:] == ("7.5", "+4.0 (-8.7 to 16.7)")
+    assert table.rows[1][3:6] == ("7.5", "+4.0 (-8.7 to 16.7)", "0.156")
+
+
+def test_losses_rank_a_method_behind_one_that_never_loses() -> None:
+    """The clipped score forgets them: 1 and -7 halves of the way are 0.5, twice a third 0.33."""
+
+    def of(method: str, *shares: float) -> JudgedSubmission:
+        runs = (
+            JudgedRun(name, 0, 0, 0, wall(12), share, 0.8, 0.7)
+            for name, share in zip((NAME, "other"), shares, strict=True)
+        )
+        return JudgedSubmission(method, 0.5, "row 1", tuple(runs))
+
+    gambler, steady = of("gambler", 0.7, 1.0), of("steady", 0.77, 0.77)
+    assert gambler.score(0).value > steady.score(0).value
+    (table,) = standings_tables([gambler, steady])
+    assert [row[0] for row in table.rows] == ["best known", "steady", "best rule", "gambler"]
+
+
+def test_leads_of_many_methods_are_corrected_for_their_number() -> None:
+    """Holm: the least of three p values counts three times, the next twice, none below the last."""
+
+    def entry(method: str, *leads: float) -> JudgedSubmission:
+        runs = (
+            JudgedRun(f"problem {place}", 0, 0, 0, wall(12), 0.8 - lead, 0.8, 0.6)
+            for place, lead in enumerate(leads)
+        )
+        return JudgedSubmission(method, 0.5, "row 1", tuple(runs))
+
+    entries = [
+        entry("clear", 0.05, 0.06, 0.05, 0.07),
+        entry("likely", 0.01, 0.02, 0.03, 0.04),
+        entry("equal", 0.01, -0.01, 0.02, -0.02),
+    ]
+    clear, likely, equal = (of.lead_p_value(0) for of in entries)
+    (table,) = standings_tables(entries)
+    chances = {row[0]: row[5] for row in table.rows}
+    assert (clear < 0.01, likely < 0.05, equal) == (True, True, 1.0)
+    assert chances["clear"] == f"{3.0 * clear:.3f}"
+    assert chances["likely"] == f"{2.0 * likely:.3f}"
+    assert chances["equal"] == "1.000"
 
 
 @pytest.mark.parametrize(("most", "places"), [(2, 2), (16, 3)])

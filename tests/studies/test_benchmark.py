@@ -39,11 +39,11 @@ def test_the_name_of_a_candidate_has_site_family_and_place() -> None:
         named_definition("control_room-knwn")
 
 
-def test_a_curve_has_the_score_of_the_best_layout_by_then() -> None:
-    """Halfway from rule to best after two blasts; the rule counts until then."""
+def test_a_curve_has_the_points_of_the_best_layout_by_then() -> None:
+    """10 points behind the rule, then 10 ahead in one of two runs; the rule counts until then."""
     runs = [Run("a", 4, 0, 4, (), curve=((1, 0.7), (2, 0.5))), Run("a", 4, 1, 3, ())]
-    curve = mean_curve(runs, {"a": (0.6, 0.4)}, np.arange(5))
-    assert curve == pytest.approx([0.0, 0.0, 0.25, 0.25, 0.25])
+    curve = mean_curve(runs, {"a": 0.6}, np.arange(5))
+    assert curve == pytest.approx([0.0, -5.0, 5.0, 5.0, 5.0])
 
 
 def test_a_best_known_layout_is_better_than_the_rule_on_the_cells_of_a_search_too() -> None:
