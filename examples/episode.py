@@ -13,5 +13,5 @@ while not ended:
     observation, reward, terminated, truncated, info = env.step(action)
     ended = terminated or truncated
 
-print(f"{len(info['layout'])} modules take off {info['reduction']:.1%} of the impulse")
+print(f"{info['placed']} modules take off {info['reduction']:.1%} of the impulse")
 print(f"{info['impulse_pa_s']:.0f} Pa s on the building, reward {reward:.4f}")

@@ -113,6 +113,10 @@ class CorrectedReward:
     _errors: dict[Layout, float] = field(default_factory=dict)
     _correction: Correction | None = None
 
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
+        """Return `reduction`."""
+        return ("reduction",)
+
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term `reduction`, 0 before the end."""
         guessed = ReductionReward()(transition)["reduction"]
@@ -211,7 +215,7 @@ class DemoTraining:
                 observation, deterministic=deterministic, action_masks=self._env.action_masks()
             )
             observation, _, ended, _, info = self._env.step(np.int64(action))
-        return tuple(sorted(info["layout"])), info["reduction"]
+        return tuple(sorted(self._env.placement.layout)), info["reduction"]
 
     def _blast(self, layouts: Sequence[tuple[Layout, float]], shown: int) -> None:
         """Blast layouts, each with its guess; the curve gets the means of the first ones."""

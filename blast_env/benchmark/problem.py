@@ -23,6 +23,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
+from blast_env.layout.placement import load_relevant
 from blast_env.values import whole_number
 
 _MOST_REPEATS: Final = 200
@@ -161,7 +162,7 @@ class BenchmarkProblem(DesignProblem):
             raise BlastEnvError(f"threats is {count}, must be 1 to {most}")
         checked = tuple(sorted(check_layout(self.scenario, layout)))
         pairs: list[tuple[Layout, LoadCase]] = [
-            (checked, threat) for threat in self.case.threats[:count]
+            (checked, threat) for threat in self.case.threats[:count] if load_relevant(checked)
         ]
         before = self.blasts
         try:

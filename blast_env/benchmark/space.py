@@ -11,6 +11,7 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Cell, Element, Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
+from blast_env.values import whole_number
 
 KEYS_PER_PIECE = 3
 """The variant, the row and the column."""
@@ -75,15 +76,14 @@ class LayoutSpace:
             choices: One choice per place (places,).
 
         Raises:
-            BlastEnvError: If their number is wrong, or a choice is out of bounds.
+            BlastEnvError: If their number is wrong, or a choice is no integer or out of bounds.
         """
         if len(choices) != len(self.options):
             raise BlastEnvError(f"choices: has {len(choices)}, must have {len(self.options)}")
         layout: list[Element] = []
         for index, (choice, options) in enumerate(zip(choices, self.options, strict=True)):
-            if not 0 <= choice <= len(options):
-                raise BlastEnvError(f"choices[{index}] is {choice}, must be 0 to {len(options)}")
-            layout += options[int(choice) - 1 : int(choice)] if choice else ()
+            own = whole_number(f"choices[{index}]", choice, 0, len(options))
+            layout += options[own - 1 : own] if own else ()
         return tuple(layout)
 
     def choices_of(self, layout: Sequence[Element]) -> IntArray:
@@ -131,16 +131,17 @@ class LayoutSpace:
         """Return the legal layout of a vector of random keys.
 
         Args:
-            keys: Numbers (keys,), clipped to 0 to 1.
+            keys: Numbers (keys,); those beyond 0 and 1 count as 0 and 1.
 
         Raises:
-            BlastEnvError: If their number is wrong, or one is NaN.
+            BlastEnvError: If their number is wrong, or one is NaN or infinite.
         """
         given = np.asarray(keys, dtype=np.float64)
         if given.shape != (self.keys,):
             raise BlastEnvError(f"keys: has the shape {given.shape}, must have ({self.keys},)")
-        if np.isnan(given).any():
-            raise BlastEnvError(f"keys[{int(np.isnan(given).argmax())}] is NaN, must be a number")
+        if not np.isfinite(given).all():
+            index = int(np.isfinite(given).argmin())
+            raise BlastEnvError(f"keys[{index}] is {given[index]}, must be a finite number")
         placement = self._empty
         sizes = np.array(self.key_sizes)
         for own in np.clip(given, 0.0, 1.0).reshape(-1, KEYS_PER_PIECE):

@@ -214,7 +214,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 from that of the representative one.
         """
         super().reset(seed=seed)
-        episode = self.task.start(self.np_random, ResetOptions.from_mapping(options))
+        chosen = ResetOptions.from_mapping(options)
+        episode = self.task.start(self.np_random, chosen, self.reward_strategy)
         self._begun = episode
         if self.render_mode == "human":
             self._display.show(episode)
@@ -235,12 +236,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         if episode.ended:
             raise gym.error.ResetNeeded("the episode has ended: call reset")
         terms = episode.act(int(action), self.reward_strategy, self.illegal)
-        info = episode.information() | {"reward_terms": terms}
-        if episode.ended:
-            info |= episode.final_information(self.task.evaluators)
         if self.render_mode == "human":
             self._display.show(episode)
-        return episode.observe(), total(terms), episode.ended, False, info
+        return episode.observe(), total(terms), episode.ended, False, episode.information()
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (actions,).

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import fsum, isnan
+from math import fsum
 from typing import Any, Final
 
 import numpy as np
@@ -29,12 +29,22 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import Assessment, BlastEvaluator, DesignProblem, Evaluators
+from blast_env.evaluation.evaluator import (
+    Assessment,
+    BlastCounts,
+    BlastEvaluator,
+    DesignProblem,
+    Evaluators,
+)
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnySource, Scenario
+from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
+
+Terms = Mapping[str, float]
+"""The terms of a reward by their names."""
 
 ILLEGAL_TERM: Final = "invalid_actions"
 """The name of the reward term for illegal actions."""
@@ -71,6 +81,7 @@ class Episode:
         initial: The layout at the start.
         placement: The modules placed so far.
         actions: The numbered actions.
+        terms: The terms of the last reward; before the first action all are 0.
         chosen: The choices so far for the next module or piece; `None` before the first.
         invalid_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
@@ -88,6 +99,7 @@ class Episode:
     initial: Layout
     placement: LayoutState
     actions: NumberedActions
+    terms: Terms
     chosen: ActionChoice | None = None
     invalid_actions: int = 0
     without_effect: int = 0
@@ -137,7 +149,7 @@ class Episode:
             illegal: The consequences of an illegal action.
 
         Raises:
-            BlastEnvError: If the reward has a term with the reserved name `ILLEGAL_TERM`.
+            BlastEnvError: If the terms of the reward differ from those it names.
         """
         self.move(action, illegal)
         return self.pay(reward, illegal)
@@ -174,12 +186,14 @@ class Episode:
             problem=self.problem,
         )
         self.begun = True
-        terms = reward(transition)
-        if ILLEGAL_TERM in terms:
+        terms = {**reward(transition), ILLEGAL_TERM: 0.0 if self.has_effect else -illegal.cost}
+        if [*terms] != [*self.terms]:
+            found, named = (", ".join([*each][:-1]) for each in (terms, self.terms))
             raise BlastEnvError(
-                f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
+                f"the reward has the terms {found}, must have those that it names: {named}"
             )
-        return {**terms, ILLEGAL_TERM: 0.0 if self.has_effect else -illegal.cost}
+        self.terms = terms
+        return terms
 
     @property
     def ends(self) -> bool:
@@ -203,55 +217,85 @@ class Episode:
         return self.problem.assess(self.placement.checked), self.problem.assess(())
 
     def information(self) -> dict[str, Any]:
-        """Return the information after every action and after `reset`."""
-        mask = self.action_mask().astype(np.int8)  # the type for `sample(mask=...)` of a space
-        return {"action_mask": mask, "invalid_actions": self.invalid_actions}
+        """Return the information after `reset` and after every action.
 
-    def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
-        """Return the information after the charge has gone off.
-
-        Args:
-            evaluators: The evaluators, which count the blasts.
+        Keys, shapes and types are the same throughout an episode. Until the charge has gone off,
+        loads, charges and counts are 0 and levels are empty.
         """
-        protected, unprotected = self.assess()
-        case = self.problem.case
+        placement, problem = self.placement, self.problem
+        case = problem.case
+        charges = len(case.charges)
         seeds = [threat.seed for threat in case.threats]
+        return {
+            "action_mask": self.action_mask().astype(np.int8),  # as `sample(mask=...)` wants it
+            "invalid_actions": self.invalid_actions,
+            "placed": len(placement.layout),
+            "layout": placement.catalogue.table(placement.layout),
+            "reward_terms": dict(self.terms),
+            **self._outcome(),
+            "scenario_hash": problem.evaluator.scenario_hash,
+            "calibration": problem.evaluator.calibration_name,
+            "blast_seeds": tuple(tuple(seeds[index::charges]) for index in range(charges)),
+        }
+
+    def _outcome(self) -> dict[str, Any]:
+        """Return the information on the blasts at the end."""
+        case, nothing = self.problem.case, Assessment(0.0, 0.0, 0.0, 0.0, False)
+        counts = self.problem.evaluator.counts if self.ended else BlastCounts()
+        protected, unprotected = self.assess() if self.ended else (nothing, nothing)
+        charges = (_NO_CHARGE,) * len(case.charges)
+        if self.ended:
+            charges = case.charges_against(self.placement.layout)
         return {
             "impulse_psi_s": protected.impulse_psi_s,
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
-            **_where_known(protected, unprotected),
-            "reduction": protected.reduction_from(unprotected),
-            "layout": self.placement.layout,
-            "scenario_hash": self.problem.evaluator.scenario_hash,
-            "calibration": self.problem.evaluator.calibration_name,
+            **self._outcome_where_known(protected, unprotected),
+            "reduction": protected.reduction_from(unprotected) if self.ended else 0.0,
             "calibration_in_range": protected.in_range,
-            "charges": case.charges_against(self.placement.layout),
-            "blast_seeds": tuple(
-                tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))
-            ),
-            "blasts": evaluators.counts.blasts,
-            "cache_hits": evaluators.counts.cache_hits,
-            "cache_hit_rate": evaluators.counts.cache_hit_rate,
+            "charges": charges,
+            "blasts": counts.blasts,
+            "cache_hits": counts.cache_hits,
+            "cache_hit_rate": counts.cache_hit_rate,
+        }
+
+    def _outcome_where_known(
+        self, protected: Assessment, unprotected: Assessment
+    ) -> dict[str, Any]:
+        """Return simulation units or peaks by the engine, the response by the objective."""
+        evaluator, objective = self.problem.evaluator, self.problem.scenario.objective
+        if evaluator.engine.medium == "particles":
+            return {"impulse_sim": protected.impulse_sim}
+        if not evaluator.engine.gives_peaks(self.problem.scenario):
+            return {}
+        peaks = {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
+        if not objective.is_response:
+            return peaks
+        levels = [each.level.label if each.level else "" for each in (protected, unprotected)]
+        return {
+            **peaks,
+            "response": protected.load,
+            "unprotected_response": unprotected.load,
+            "level_of_protection": levels[0],
+            "unprotected_level_of_protection": levels[1],
         }
 
 
-def _where_known(protected: Assessment, unprotected: Assessment) -> dict[str, Any]:
-    """Return simulation units or peaks by the engine, and the response, if the objective has it."""
-    if protected.impulse_sim is not None:
-        return {"impulse_sim": protected.impulse_sim}
-    if isnan(unprotected.peak_pa):
-        return {}
-    peaks = {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
-    if protected.level is None or unprotected.level is None:
-        return peaks
-    return {
-        **peaks,
-        "response": protected.load,
-        "unprotected_response": unprotected.load,
-        "level_of_protection": protected.level.label,
-        "unprotected_level_of_protection": unprotected.level.label,
-    }
+_NO_CHARGE: Final = Charge((0.0, 0.0), 0.0)
+
+
+def terms_of(reward: Reward, scenario: Scenario) -> Terms:
+    """Return the terms of a reward before the first action: all are 0.
+
+    Raises:
+        BlastEnvError: If it names the term that the environment adds itself.
+    """
+    names = reward.terms(scenario)
+    if ILLEGAL_TERM in names:
+        raise BlastEnvError(
+            f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
+        )
+    return dict.fromkeys((*names, ILLEGAL_TERM), 0.0)
 
 
 def total(terms: Mapping[str, float]) -> float:
@@ -320,7 +364,7 @@ class Task:
     evaluators: Evaluators
     prepared: "list[_Prepared]" = field(default_factory=list, repr=False)
 
-    def start(self, rng: np.random.Generator, options: ResetOptions) -> Episode:
+    def start(self, rng: np.random.Generator, options: ResetOptions, reward: Reward) -> Episode:
         """Draw an episode; options do not change the amount drawn from the random stream.
 
         Raises:
@@ -353,6 +397,7 @@ class Task:
             initial=placement.checked,
             placement=placement,
             actions=prepared.actions.with_sources(observable.sources),
+            terms=terms_of(reward, scenario),
         )
 
     def _prepared_for(self, scenario: Scenario) -> "_Prepared":

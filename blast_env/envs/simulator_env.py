@@ -19,7 +19,7 @@ from blast_env.envs.arguments import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import PAPER_ENGINES, Blast, BlastResult, Engine, find_engine
 from blast_env.geometry import Element
-from blast_env.layout import check_layout
+from blast_env.layout import LayoutState, check_layout
 from blast_env.layout.build_site import draw_threat
 from blast_env.particles.balls import CollisionType
 from blast_env.particles.run import BlastRun
@@ -101,9 +101,18 @@ class BlastInProgress(ABC):
     def impulse(self) -> float:
         """Weighted impulse on the protected structures so far, simulation units or Pa s."""
 
+    @property
+    def collisions(self) -> tuple[dict[str, Any], ...]:
+        """The collisions of the last `advance`; none with gas."""
+        return ()
+
     @abstractmethod
-    def advance(self, until_s: float) -> dict[str, Any]:
-        """Advance to a time, or the end; return the information on that part."""
+    def information(self) -> dict[str, Any]:
+        """Return the information on the loads so far."""
+
+    @abstractmethod
+    def advance(self, until_s: float) -> None:
+        """Advance to a time, or the end."""
 
     @abstractmethod
     def observe(self) -> Observation:
@@ -136,6 +145,7 @@ class ParticlesInProgress(BlastInProgress):
     def __init__(self, blast: Blast) -> None:
         self.blast = blast
         self.run = blast.start()
+        self._recorded = 0
 
     @property
     def site(self) -> BlastSite:
@@ -147,17 +157,24 @@ class ParticlesInProgress(BlastInProgress):
         """Weighted impulse on the protected structures so far, simulation units."""
         return sum(o.weight * o.impulse for o in self.run.obstacles if o.protected)
 
-    def advance(self, until_s: float) -> dict[str, Any]:
-        """Advance to a time, or the end; return the collisions of that part and the impulse."""
-        recorded = len(self.run.log)
-        self.run.advance(until_s)
-        collisions: tuple[dict[Any, Any], ...] = ()
-        if len(self.run.log) > recorded:
-            from blast_env.particles.tables import collision_table  # pandas takes long to import
+    @property
+    def collisions(self) -> tuple[dict[Any, Any], ...]:
+        """The collisions of the last `advance`, with the columns of `COLLISION_COLUMNS`."""
+        if len(self.run.log) == self._recorded:
+            return ()
+        from blast_env.particles.tables import collision_table  # pandas takes long to import
 
-            table = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
-            collisions = tuple(table.to_dict("records"))
-        return {"collisions": collisions, "impulse_sim": self.impulse}
+        table = collision_table(self.run.log.to_array(self._recorded), self.run.obstacles)
+        return tuple(table.to_dict("records"))
+
+    def information(self) -> dict[str, Any]:
+        """Return the number of collisions and the impulse so far."""
+        return {"collisions": len(self.run.log), "impulse_sim": self.impulse}
+
+    def advance(self, until_s: float) -> None:
+        """Advance to a time, or the end."""
+        self._recorded = len(self.run.log)
+        self.run.advance(until_s)
 
     def observe(self) -> Observation:
         """Return impulses, counts of balls and the time."""
@@ -241,10 +258,13 @@ class GasInProgress(BlastInProgress):
         """Impulse on the protected structures so far, by weight, Pa s."""
         return self._result.now().loads().protected_impulse_pa_s
 
-    def advance(self, until_s: float) -> dict[str, Any]:
-        """Advance to a time, or the end; return the impulse so far."""
-        self.run.advance(until_s)
+    def information(self) -> dict[str, Any]:
+        """Return the impulse so far."""
         return {"impulse_pa_s": self.impulse}
+
+    def advance(self, until_s: float) -> None:
+        """Advance to a time, or the end."""
+        self.run.advance(until_s)
 
     def observe(self) -> Observation:
         """Return loads, the plan of overpressure, gauges and the time."""
@@ -347,7 +367,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     | `overpressure` | (rows, columns) | float32 | of the cells 1.5 m above the site | Pa |
     | `gauges` | (gauges,) | float64 | overpressure at the scenario's gauges | Pa |
 
-    The modules are those of all structures, without the barrier's, as in `info["module_ids"]`.
+    The modules are those of all structures, without the barrier's, as in `env.module_ids`.
     The rows of `overpressure` go upwards, and solids have 0.
 
     ## Rewards
@@ -362,9 +382,10 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     `"charge_position_m"`, (x, y) of the charge, whose mass is still drawn.
 
     ## Episode end
-    Terminated when the run has ended (`info["end_reason"]` has the reason); never truncated. `step`
-    returns `collisions` (keys of `blast_env.particles.tables.COLLISION_COLUMNS`) and `impulse_sim`,
-    or with gas `impulse_pa_s`; at the end also `digest`.
+    Terminated when the run has ended; never truncated. `info` always has the same keys: `seed`,
+    `scenario_hash`, charge and `layout`; the number of `collisions` and `impulse_sim`, or with gas
+    `impulse_pa_s`, so far; `end_reason` and `digest`, empty before the end. `env.collisions` has
+    those of the last step (keys of `blast_env.particles.tables.COLLISION_COLUMNS`).
 
     ## Arguments
     See `__init__`, below.
@@ -430,6 +451,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         unfolding = _unfolding_class(self._engine)
         self.observation_space = unfolding.space(self.scenario, self._engine)
         self._blast: BlastInProgress | None = None
+        self._constant: dict[str, Any] = {}
         self._target_s = 0.0
         self._window: Window | None = None
 
@@ -445,17 +467,17 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         drawn_seed = int(self.np_random.integers(2**31)) if seed is None else seed
         blast = self._lay_out(drawn_seed, checked_options(options, _OPTIONS))
         self._blast, self._target_s = blast, blast.time_s
-        if self.render_mode == "human":
-            self.render()
-        info = {
+        layout = check_layout(self.scenario, blast.layout)
+        self._constant = {
             "seed": drawn_seed,
             "scenario_hash": self.scenario.content_hash,
             "charge_position_m": blast.site.charge.position_m,
             "charge_tnt_kg": blast.site.charge.tnt_kg,
-            "layout": blast.layout,
-            "module_ids": blast.module_ids,
+            "layout": LayoutState(self.scenario, layout).catalogue.table(layout),
         }
-        return blast.observe(), info
+        if self.render_mode == "human":
+            self.render()
+        return blast.observe(), self._information(blast)
 
     def step(self, action: np.int64 | int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance the blast by `step_s`; the action is always 0.
@@ -471,14 +493,22 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
             raise gym.error.ResetNeeded("the blast has not been laid out or has ended: call reset")
         before = blast.impulse
         self._target_s += self.step_s
-        info = blast.advance(self._target_s)
-        if blast.end_reason is not None:
-            result = blast.result()
-            info |= {"end_reason": str(result.end_reason), "digest": result.digest}
+        blast.advance(self._target_s)
+        observation, reward = blast.observe(), before - blast.impulse
+        terminated = blast.end_reason is not None
         if self.render_mode == "human":
             self.render()
-        ended = blast.end_reason is not None
-        return blast.observe(), before - blast.impulse, ended, False, info
+        return observation, reward, terminated, False, self._information(blast)
+
+    @property
+    def module_ids(self) -> tuple[str, ...]:
+        """Names of the modules of the structures, in the order of the observation."""
+        return self._begun.module_ids
+
+    @property
+    def collisions(self) -> tuple[dict[str, Any], ...]:
+        """The collisions of the last step; none with gas."""
+        return self._begun.collisions
 
     def result(self) -> "BlastResult | GasResult":
         """Return the result of the ended blast, as `blast_env.simulate` does.
@@ -487,9 +517,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
             gymnasium.error.ResetNeeded: If `reset` has not been called.
             ValueError: If the run has not ended.
         """
-        if self._blast is None:
-            raise gym.error.ResetNeeded("there is no blast yet: call reset")
-        return self._blast.result()
+        return self._begun.result()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the present frame (`"rgb_array"`) or show it in a window (`"human"`)."""
@@ -514,6 +542,23 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the window: a copy opens a new one."""
         return {**self.__dict__, "_window": None}
+
+    @property
+    def _begun(self) -> BlastInProgress:
+        if self._blast is None:
+            raise gym.error.ResetNeeded("there is no blast yet: call reset")
+        return self._blast
+
+    def _information(self, blast: BlastInProgress) -> dict[str, Any]:
+        """Return the information, whose keys are always the same."""
+        ended = blast.end_reason is not None
+        return {
+            **self._constant,
+            "layout": self._constant["layout"].copy(),
+            **blast.information(),
+            "end_reason": str(blast.end_reason) if ended else "",
+            "digest": blast.result().digest if ended else "",
+        }
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> BlastInProgress:
         layout = check_layout(self.scenario, options.get("layout", self.layout))

@@ -147,6 +147,7 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
             "build zone (rows, columns)",
             "catalogue (item, turned, size)",
             "room for vehicles (none or some)",
+            "objective (term of the reward)",
         ),
         _sizes(scenario, has_room and not scenario.vehicles),
         _sizes(representative, False),
@@ -165,7 +166,8 @@ def _sizes(scenario: Scenario, has_room: bool) -> tuple[tuple[object, ...], ...]
         (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
     ]
     vehicles = ("some",) if scenario.vehicles or has_room else ("none",)
-    return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles
+    term = (scenario.objective.term,)
+    return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles, term
 
 
 @dataclass(frozen=True)
@@ -196,12 +198,11 @@ class Reward(Protocol):
     environment's knowledge. So the sum until then should not exceed the sum after finishing.
     """
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the terms; the reward is their sum.
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return the names of the terms; `invalid_actions` is reserved for the environment."""
 
-        The names are always the same, without that reserved for the environment
-        (`invalid_actions`).
-        """
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the terms, in the order of their names; the reward is their sum."""
 
 
 DEPOSIT: Final = 2.0
@@ -219,12 +220,12 @@ class TerminalReward:
     truncation.
     """
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the term of the load, 0 before the end, and `deposit`, 0 in between.
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return `impulse` (psi s), `peak` (psi), `load` (both) or `response`, and `deposit`."""
+        return scenario.objective.term, "deposit"
 
-        The term of the load is named `impulse` (psi s), `peak` (psi) or `load` (both, without a
-        unit).
-        """
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the term of the load, 0 before the end, and `deposit`, 0 in between."""
         reward_value = transition.problem.reward_value
         load = deposit = 0.0
         if transition.begins != transition.ended:
@@ -245,8 +246,12 @@ class IncrementalReward:
     agent finished then, and over an episode that of `TerminalReward`.
     """
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
         """Return the term of the load, named as by `TerminalReward`."""
+        return (scenario.objective.term,)
+
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the load that the action took off."""
         load = 0.0
         reward_value = transition.problem.reward_value
         if transition.after != transition.before:
@@ -264,6 +269,10 @@ class ReductionReward:
     without a barrier, and of the same order on every site. The load includes the power law of the
     particle model. A truncated episode pays 0, as does a site without a load.
     """
+
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
+        """Return `reduction`."""
+        return ("reduction",)
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term `reduction`, 0 before the end."""

@@ -1,6 +1,6 @@
 """The vector entry point of `gymnasium.make_vec`: many barrier environments in one batch."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import gymnasium as gym
@@ -75,6 +75,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self._actions = self.one.action_space.n  # type: ignore[attr-defined]
         self._most_steps = max_episode_steps or np.inf
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
+        self._seeds: list[int | None] = [None] * self.num_envs
         self._episodes: list[Episode] = []
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
@@ -111,10 +112,29 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             )
         chosen = _indices(mask)
         for index in chosen:
-            if seeds[index] is not None or self._rngs[index] is None:
-                self._rngs[index], _ = seeding.np_random(seeds[index])
+            if seeds[index] is not None:
+                self._rngs[index], self._seeds[index] = seeding.np_random(seeds[index])
+        self._seed_missing()
         self._begin(chosen, ResetOptions.from_mapping(given))
         return self._observe(self._episodes), self._information(chosen)
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """The seed of each environment's random numbers, as `SyncVectorEnv` has them."""
+        self._seed_missing()
+        return tuple(self._seeds)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random numbers of each environment; `reset` seeds them, nothing sets them."""
+        self._seed_missing()
+        return tuple(each for each in self._rngs if each is not None)
+
+    def _seed_missing(self) -> None:
+        """Seed the random numbers of environments that have none."""
+        for index, rng in enumerate(self._rngs):
+            if rng is None:
+                self._rngs[index], self._seeds[index] = seeding.np_random()
 
     def step(
         self, actions: IntArray | Sequence[int]
@@ -132,7 +152,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         wanted = self._checked(actions, played)
         for index in played:
             self._episodes[index].move(wanted[index], self.one.illegal)
-        rewards, own = self._pay(played)
+        rewards = self._pay(played)
         self._steps[played] += 1
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         terminated[played] = [self._episodes[index].ended for index in played]
@@ -140,14 +160,10 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         truncated[begun] = False
         self._begin(begun, ResetOptions())
         self._over = terminated | truncated
-        infos = self._information(range(self.num_envs))
-        for index in _indices(terminated):
-            own[index] |= self._episodes[index].final_information(self.one.task.evaluators)
+        final: dict[str, Any] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            self._begin_again(_indices(self._over), own, infos)
-        self._add_terms(infos, own)
-        for index, info in own.items():
-            self._add_info(infos, info, index)
+            final = self._begin_again(_indices(self._over))
+        infos = self._information(range(self.num_envs)) | final
         return self._observe(self._episodes), rewards, terminated, truncated, infos
 
     def action_masks(self) -> BoolArray:
@@ -175,29 +191,15 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         wanted: list[int] = given.tolist()
         return wanted
 
-    def _pay(self, played: list[int]) -> tuple[FloatArray, dict[int, dict[str, Any]]]:
-        """Run the blasts; return the rewards, and their terms by environment."""
+    def _pay(self, played: list[int]) -> FloatArray:
+        """Run the blasts; return the rewards."""
         episodes = [self._episodes[index] for index in played]
         find_legal(each.placement for each in episodes)
         run_together(blast for each in episodes for blast in each.blasts_due())
-        rewards, own = np.zeros(self.num_envs), dict[int, dict[str, Any]]()
-        for index, each in zip(played, episodes, strict=True):
-            terms = each.pay(self.one.reward_strategy, self.one.illegal)
-            rewards[index] = total(terms)
-            own[index] = {"reward_terms": terms}
-        return rewards, own
-
-    def _add_terms(self, infos: dict[str, Any], own: dict[int, dict[str, Any]]) -> None:
-        """Move the terms of rewards to the information, as `_add_info` does, but all at once."""
-        terms = {i: info.pop("reward_terms") for i, info in own.items() if "reward_terms" in info}
-        if not terms:
-            return
-        known = np.isin(np.arange(self.num_envs), list(terms))
-        arrays: dict[str, NDArray[Any]] = {}
-        for name in next(iter(terms.values())):
-            arrays |= {name: np.zeros(self.num_envs), f"_{name}": known}
-            arrays[name][known] = [each[name] for each in terms.values()]
-        infos |= {"reward_terms": arrays, "_reward_terms": known}
+        rewards = np.zeros(self.num_envs)
+        for index, episode in zip(played, episodes, strict=True):
+            rewards[index] = total(episode.pay(self.one.reward_strategy, self.one.illegal))
+        return rewards
 
     def _begin(self, chosen: list[int], options: ResetOptions) -> None:
         """Begin an episode in some environments."""
@@ -213,32 +215,25 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     def _drawn(self, index: int, options: ResetOptions) -> Episode:
         rng = self._rngs[index]
         assert rng is not None
-        return self.one.task.start(rng, options)
+        return self.one.task.start(rng, options, self.one.reward_strategy)
 
-    def _begin_again(
-        self, over: list[int], own: dict[int, dict[str, Any]], infos: dict[str, Any]
-    ) -> None:
-        """Begin episodes where others have ended, whose last observation is in the information."""
+    def _begin_again(self, over: list[int]) -> dict[str, Any]:
+        """Begin episodes where others have ended; return the last observation and information."""
         if not over:
-            return
+            return {}
         ended = [self._episodes[index] for index in over]
-        last = self._observe(ended)
-        self._begin(over, ResetOptions())
+        last, final = self._observe(ended), dict[str, Any]()
         for number, (index, episode) in enumerate(zip(over, ended, strict=True)):
-            final = {**episode.information(), **own[index]}
-            own[index] = {"final_obs": one_of(last, number), "final_info": final}
-        infos |= self._information(range(self.num_envs))
+            kept = {"final_obs": one_of(last, number), "final_info": episode.information()}
+            final = self._add_info(final, kept, index)
+        self._begin(over, ResetOptions())
+        return final
 
     def _information(self, chosen: Iterable[int]) -> dict[str, Any]:
         """Return the information after every action and after `reset`, in arrays."""
-        masks = np.zeros((self.num_envs, self._actions), dtype=np.int8)
-        illegal, known = np.zeros(self.num_envs, dtype=int), np.zeros(self.num_envs, dtype=bool)
-        for index in chosen:
-            masks[index] = self._episodes[index].action_mask()
-            illegal[index] = self._episodes[index].invalid_actions
-            known[index] = True
-        arrays = {"action_mask": masks, "invalid_actions": illegal}
-        return arrays | {f"_{name}": known.copy() for name in arrays}
+        known = np.zeros(self.num_envs, dtype=bool)
+        known[list(chosen)] = True
+        return _stacked([episode.information() for episode in self._episodes], known)
 
     def _observe(self, episodes: Sequence[Episode]) -> Any:
         """Return the observations of episodes, with a leading axis."""
@@ -252,6 +247,29 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             masks = np.array([each.action_mask() for each in episodes])
             observed |= {MASK: masks.astype(np.int8)}
         return observed
+
+
+def _stacked(infos: Sequence[Mapping[str, Any]], known: BoolArray) -> dict[str, Any]:
+    """Return the information of all environments in arrays, as `VectorEnv._add_info` does.
+
+    Args:
+        infos: That of each environment, with the same keys.
+        known: Whether an environment's information is returned; it is 0 or `None` otherwise.
+    """
+    stacked: dict[str, Any] = {}
+    for key, first in infos[0].items():
+        values = [each[key] for each in infos]
+        if isinstance(first, Mapping):
+            stacked[key] = _stacked(values, known)
+        elif isinstance(first, np.ndarray | int | float):
+            stacked[key] = np.array(values)
+            stacked[key][~known] = 0
+        else:
+            stacked[key] = np.empty(len(infos), dtype=object)
+            for index in np.flatnonzero(known):
+                stacked[key][index] = values[index]
+        stacked[f"_{key}"] = known.copy()
+    return stacked
 
 
 def _indices(mask: BoolArray) -> list[int]:

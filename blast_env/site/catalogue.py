@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
@@ -464,11 +465,41 @@ class Catalogue:
             LayoutError: If it is not a sequence of elements; sets, floats and truth values are
                 refused.
         """
+        if isinstance(layout, np.ndarray) and layout.ndim == 3:
+            return self._elements_of(layout)
         is_array = isinstance(layout, np.ndarray) and layout.ndim > 0
         if is_array or (isinstance(layout, Sequence) and not isinstance(layout, str | bytes)):
             return tuple(self.element_from(item, f"layout[{i}]") for i, item in enumerate(layout))
         what = "(row, column, item, turned)" if self.has_items else "(row, column) pairs"
         raise LayoutError(f"layout is {type_word(layout)}, must be a list of {what}")
+
+    def table(self, layout: Sequence[Element]) -> NDArray[np.int8]:
+        """Return a layout in an array whose shape is the same for all layouts.
+
+        Args:
+            layout: Elements of the catalogue.
+
+        Returns:
+            1 where a variant has its lower left cell, 0 elsewhere (variants, rows, columns). The
+            order of the elements is lost; `layout_from` reads them, sorted as for an evaluation.
+        """
+        table = np.zeros((len(self.variants), *self.shape), dtype=np.int8)
+        for element in layout:
+            table[self.variant_number(element), element[0], element[1]] = 1
+        return table
+
+    def _elements_of(self, table: NDArray[np.integer]) -> tuple[Element, ...]:
+        """Return the elements of an array as by `table`.
+
+        Raises:
+            LayoutError: If it is none.
+        """
+        shape = (len(self.variants), *self.shape)
+        if table.shape != shape or not np.isin(table, (0, 1)).all():
+            raise LayoutError(
+                f"layout is an array of the shape {table.shape}, must have {shape} and 0 or 1"
+            )
+        return tuple(sorted(map(self.element, np.flatnonzero(table).tolist())))
 
     @cached_property
     def _numbers(self) -> dict[tuple[str, bool], int]:

@@ -89,6 +89,10 @@ class SurrogateEngine(Engine):
         """
         return self.loads_at_once([EngineBlast(scenario, layout, charge, seed)])[0]
 
+    def gives_peaks(self, scenario: Scenario) -> bool:
+        """Return whether the objective counts overpressures, else none are predicted."""
+        return scenario.objective.needs_peaks
+
     def caveats(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
         """Return that these are no blasts."""
         return ("These are predictions of a surrogate, not blasts: judge with engine 'gas'.",)

@@ -231,7 +231,7 @@ def _draws(env: BlastBarrierEnv, predict: Predict, number: int) -> list[Guessed]
         while not ended:
             action, _ = predict(seen, steady)
             seen, _, ended, _, info = env.step(np.int64(action))
-        return tuple(sorted(info["layout"])), info["reduction"]
+        return tuple(sorted(env.placement.layout)), info["reduction"]
 
     return [drawn(steady=index == 0) for index in range(number + 1)]
 

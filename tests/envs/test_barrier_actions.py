@@ -98,7 +98,7 @@ def paid(env: BlastBarrierEnv, layout: Layout) -> tuple[list[float], dict[str, A
             assert (ended, info["invalid_actions"]) == (False, 0)
             rewards.append(reward)
     _, reward, ended, _, info = env.step(actions.finish)
-    assert (ended, info["layout"]) == (True, layout)
+    assert (ended, env.placement.layout) == (True, layout)
     return [*rewards, reward], info
 
 
@@ -255,7 +255,7 @@ def test_what_repeats_without_effect_ends_the_episode() -> None:
     env.step(int(np.flatnonzero(env.action_masks())[0]))
     assert not env.step(other_choice)[2]
     _, _, ended, _, info = env.step(other_choice)
-    assert (ended, info["invalid_actions"], len(info["layout"])) == (True, 3, 1)
+    assert (ended, info["invalid_actions"], info["placed"]) == (True, 3, 1)
 
 
 def test_block_and_cell_mean_the_nearest_ones() -> None:

@@ -36,7 +36,8 @@ def test_placing_the_stock_or_finishing_sets_off_the_charge_with_what_stands() -
     _, _, ended, truncated, info = env.step(FINISH)
     assert ended
     assert not truncated
-    assert info["layout"] == ((1, 2),)
+    assert env.placement.layout == ((1, 2),)
+    assert np.argwhere(info["layout"]).tolist() == [[0, 1, 2]]
     assert info["reward_terms"]["impulse"] == -info["impulse_psi_s"] < 0.0
 
 
@@ -189,6 +190,9 @@ def test_to_be_cut_off_never_pays_better_than_to_finish(
 class PayPerModule:
     """A reward of a user's."""
 
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        return "modules", "end"
+
     def __call__(self, transition: Transition) -> dict[str, float]:
         return {"modules": float(len(transition.after)), "end": -7.0 * transition.ended}
 
@@ -222,9 +226,22 @@ def test_an_observation_of_ones_own_is_seen() -> None:
 
 
 def test_a_reward_must_not_name_the_term_of_the_environment() -> None:
-    env = make(reward=lambda _: {"invalid_actions": 1.0})
-    env.reset(seed=1)
+    class Reserved(PayPerModule):
+        def terms(self, scenario: Scenario) -> tuple[str, ...]:
+            return ("invalid_actions",)
+
     with pytest.raises(BlastEnvError, match="'invalid_actions', which the environment adds"):
+        make(reward=Reserved()).reset(seed=1)
+
+
+def test_a_reward_must_have_the_terms_that_it_names() -> None:
+    class Other(PayPerModule):
+        def terms(self, scenario: Scenario) -> tuple[str, ...]:
+            return "modules", "last"
+
+    env = make(reward=Other())
+    env.reset(seed=1)
+    with pytest.raises(BlastEnvError, match=r"terms modules, end, must have .*: modules, last"):
         env.step(0)
 
 
@@ -267,7 +284,7 @@ def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> Non
 def test_the_layout_does_not_change_the_blasts() -> None:
     env = make(threat="hidden", threats=2, realisations=2)
     ends = [play(env, seed=3, policy_seed=policy)[-1][4] for policy in (0, 1)]
-    assert ends[0]["layout"] != ends[1]["layout"]
+    assert not same(ends[0]["layout"], ends[1]["layout"])
     assert ends[0]["charges"] == ends[1]["charges"]
     assert ends[0]["blast_seeds"] == ends[1]["blast_seeds"]
     assert ends[0]["unprotected_impulse_pa_s"] == ends[1]["unprotected_impulse_pa_s"]
@@ -300,7 +317,7 @@ def test_options_fix_charge_layout_and_seeds() -> None:
     _, _, _, _, info = env.step(FINISH)
     assert info["charges"] == (((2.0, 8.0), 50.0, 1.5),)
     assert info["blast_seeds"] == ((77,),)
-    assert info["layout"] == ((0, 0), (1, 1))
+    assert env.placement.layout == ((0, 0), (1, 1))
 
 
 def test_modules_keep_clear_of_a_charge_that_an_option_puts_into_the_zone() -> None:
@@ -340,7 +357,7 @@ def test_every_reset_draws_a_site_by_the_seed() -> None:
         first, second = play(env, seed), play(twin, seed)
         assert same(first, second)
         hashes.append(first[-1][4]["scenario_hash"])
-        assert len(first[-1][4]["layout"]) == env.observable.scenario.zone.stock
+        assert first[-1][4]["placed"] == env.observable.scenario.zone.stock
     assert len(set(hashes)) > 3
 
 

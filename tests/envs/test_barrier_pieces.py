@@ -36,7 +36,7 @@ def test_actions_place_pieces_and_the_charge_goes_off() -> None:
         assert (ended, info["invalid_actions"]) == (False, 0)
         rewards.append(reward)
     _, reward, ended, _, info = env.step(catalogue.finish)
-    assert (ended, info["layout"]) == (True, WALL)
+    assert (ended, env.placement.layout) == (True, WALL)
     assert rewards[0] < 0.0 == sum(rewards[1:])  # the deposit
     assert sum(rewards) + reward == pytest.approx(-info["impulse_psi_s"], rel=1e-9)
     assert 0.1 < info["reduction"] < 1.0
@@ -174,8 +174,8 @@ def test_pieces_stop_the_vehicle_as_what_they_are() -> None:
     barrier = BlastBarrierEnv(site, engine="gas", observation="grid")
     barrier.reset(seed=0, options={"layout": layout})
     *_, info = barrier.step(site.zone.catalogue.finish)
-    worst = worst_places(site, vehicle_of(site), info["layout"])
-    assert info["layout"] == layout
+    worst = worst_places(site, vehicle_of(site), barrier.placement.layout)
+    assert barrier.placement.layout == layout
     vehicle = VehicleCharge(vehicle_of(site))
     assert info["charges"] == (charge_against(site, layout, vehicle),)
     assert worst.stand_off_m == pytest.approx(worst_places(site, vehicle_of(site)).stand_off_m)

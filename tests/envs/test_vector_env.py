@@ -118,3 +118,23 @@ def test_wrong_calls_are_refused_and_change_nothing() -> None:
     envs.step([40, 0])
     with pytest.raises(gym.error.ResetNeeded, match=r"\[0\]"):
         envs.step([0, 0])
+
+
+def test_random_numbers_are_those_of_single_environments() -> None:
+    """And `make_vec` gives them as its other modes do."""
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    vectors: list[Any] = [
+        gym.make_vec("BlastBarrier-v0", 3, vectorization_mode=mode, **chosen)
+        for mode in ("vector_entry_point", "sync")
+    ]
+    for envs in vectors:
+        envs.reset(seed=3)
+        assert envs.np_random_seed == (3, 4, 5)
+    states = [[each.bit_generator.state for each in envs.np_random] for envs in vectors]
+    assert states[0] == states[1]
+    with pytest.raises(AttributeError, match="no setter"):
+        vectors[0].unwrapped.np_random = np.random.default_rng(0)
+    vectors[0].reset(seed=[7, None, 9])
+    assert vectors[0].np_random_seed == (7, 4, 9)
+    fresh = BlastBarrierVectorEnv(2, **chosen)
+    assert len(set(fresh.np_random_seed)) == 2

@@ -109,7 +109,7 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
     assert paid == pytest.approx(-info["response"])
     assert info["reward_terms"].keys() == {"response", "invalid_actions"}
     assert info["level_of_protection"] in {each.label for each in LevelOfProtection}
-    assert info["layout"] == (TAKEN,)
+    assert env.placement.layout == (TAKEN,)
 
 
 @pytest.mark.parametrize("method", ["population_annealing", "genetic", "nsga2", "random"])

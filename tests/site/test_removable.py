@@ -109,7 +109,7 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     assert info["action_mask"][action]
     _, reward, ended, _, info = environment.step(action)
     assert ended  # nothing more can be paid for
-    assert info["layout"] == (AWAY,)
+    assert environment.placement.layout == (AWAY,)
     assert reward < 0.0
     evaluator = BlastEvaluator(scenario, SHORT)
     charge = scenario.sample_charge(np.random.default_rng(0))

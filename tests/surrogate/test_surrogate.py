@@ -359,7 +359,9 @@ def test_an_environment_pays_by_guesses() -> None:
     assert ended
     ((x_m, y_m), tnt_kg, height_m) = info["charges"][0]
     charges = [Charge((x_m, y_m), tnt_kg, height_m)] * 2
-    said = surrogate.guess(site_of(YARD), [info["layout"], ()], charges).impulse_pa_s.sum(axis=1)
+    said = surrogate.guess(site_of(YARD), [env.placement.layout, ()], charges).impulse_pa_s.sum(
+        axis=1
+    )
     assert info["reduction"] == pytest.approx(1.0 - said[0] / said[1])
     with pytest.raises(BlastEnvError, match="realisations is 2, must be 1: surrogate has no noise"):
         BlastBarrierEnv(scenario=YARD, engine=SurrogateEngine(surrogate), realisations=2)

@@ -76,7 +76,7 @@ class HeldOutCallback(BaseCallback):
         # The environments of a batch share their counts.
         is_batch = isinstance(self.training_env.unwrapped, BatchVecEnv)
         for index, info in enumerate(self.locals["infos"]):
-            if "reduction" in info:
+            if self.locals["dones"][index] and not info["TimeLimit.truncated"]:
                 self._episodes += 1
                 self._counts[0 if is_batch else index] = info["blasts"], info["cache_hits"]
         self.show(min(self.num_timesteps / self.settings.steps, 1.0))

@@ -417,6 +417,10 @@ class Engine(ABC):
         """Return an estimate of the cost of a blast; `None` for engines without one."""
         return None
 
+    def gives_peaks(self, scenario: Scenario) -> bool:  # noqa: ARG002
+        """Return whether the loads on a site have overpressures."""
+        return self.has_peaks
+
     def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002
         """Return the calibration that converts its impulses to Pa s; `None` if it needs none."""
         return None

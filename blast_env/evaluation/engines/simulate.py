@@ -3,9 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
+import numpy as np
+
 from blast_env.evaluation.engines.contract import JUDGE, BlastOutcome, Engine, find_engine
 from blast_env.evaluation.engines.particles import BlastResult, ParticleEngine
 from blast_env.geometry import Element
+from blast_env.layout import check_layout
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
 
 if TYPE_CHECKING:  # Numba takes a third of a second to import
@@ -87,8 +90,10 @@ def simulate(
             an engine that does not have it.
         BlastEnvError: If the seed is no integer, negative or too large.
     """
+    site = find_scenario(scenario)
     # Values that are not iterable are refused by the reader of the layout.
     elements = tuple(layout) if isinstance(layout, Iterable) else layout
-    site = find_scenario(scenario)
+    if isinstance(layout, np.ndarray):
+        elements = check_layout(site, layout)
     found = find_engine(engine, **settings)
     return found.blast(site, elements, seed, charge).run(progress)
