@@ -45,6 +45,7 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
 from blast_env.response.facade import (
     FacadeResponse,
+    assumption_words,
     cells_of,
     force_words,
     peak_corrected,
@@ -459,9 +460,13 @@ class Consequences:
         return self.verdict(target).word(self.is_flagged)
 
     def level_words_for(self, target: LevelOfProtection) -> str:
-        """Return whether all buildings reach a level: `level of protection below Low`."""
+        """Return whether all buildings reach a level: `level of protection below Low`.
+
+        If that rests on assumed properties of components, the words name these.
+        """
         side = "at least" if self.passes(target) else "below"
-        return f"level of protection {side} {target.title}"
+        rests = assumption_words((each.facade for each in self.responses), target)
+        return f"level of protection {side} {target.title}" + (f" ({rests})" if rests else "")
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
         """Return the consequences with other glass in all windows of the same sizes and sills."""

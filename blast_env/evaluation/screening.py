@@ -38,6 +38,7 @@ from blast_env.response.facade import (
     STOREY_M,
     FacadeResponse,
     FilledBay,
+    assumption_words,
     respond,
     response_words,
 )
@@ -127,6 +128,13 @@ class ScreenedThreat:
         """Whether a bay is so near that its wall may be breached."""
         return bool(self.nearest_m < CHECKED_SCALED_DISTANCE[0] * np.cbrt(self.charge.tnt_kg))
 
+    def doubts(self, required: Sequence[Requirement]) -> str:
+        """Return what a verdict on requirements is subject to, in brackets; empty if nothing."""
+        found = [each.response for each in self.bays]
+        rests = any(assumption_words(found, each.level) for each in required if each.level)
+        doubts = ["may be breached"] * self.may_breach + ["rests on assumptions"] * rests
+        return f" ({', '.join(doubts)})" if doubts else ""
+
     def keeps(self, requirement: Requirement) -> bool:
         """Return whether every bay keeps a requirement."""
         return all(requirement.kept_by(each.response) for each in self.bays)
@@ -198,7 +206,7 @@ class Screening:
             f"{threat.nearest_m:.1f}",
             self.stand_offs[threat.name][0].in_words(needed_m),
             *threat.words,
-            Verdict.of(kept).word().lower() + (" (may be breached)" if threat.may_breach else ""),
+            Verdict.of(kept).word().lower() + threat.doubts(required),
         )
 
     def stand_off_rows(self, threat: ScreenedThreat) -> Iterator[tuple[str, ...]]:

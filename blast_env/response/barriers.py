@@ -1,14 +1,21 @@
 """Barriers as rigid bodies that stand, slide, rock or overturn under a blast.
 
 A piece of mass M, height H and base width B stands on the ground. The pressures on its two sides
-exert a force F(t) at half its height:
+exert a force F(t) at half its height. It tips about the far edge of its base, whose way from its
+centre is a = (B cos theta - H sin theta) / 2 across and b = (H cos theta + B sin theta) / 2 down.
+While the edge holds,
 
-    sliding       M x'' = F(t) - mu M g sign(x'), once |F| exceeds mu M g
-    overturning   I theta'' = F(t) H / 2 cos theta - M g (B / 2 cos theta - H / 2 sin theta)
+    (I + M (a^2 + b^2)) theta'' = F H / 2 cos theta - M g a,    I = M (H^2 + B^2) / 12
 
-about the far edge of its base, with I = M (H^2 + B^2) / 3. It overturns when its centre passes the
-edge. An anchored piece does not move if the force stays within its anchors' capacity; otherwise it
-is treated as unanchored throughout.
+and it holds as long as its friction f = F - M (b theta'' + a theta'^2) stays within mu N, with
+N = M (g + a theta'' - b theta'^2). Else it slides, and friction limits the moment:
+
+    I theta'' = N (mu b - a) - F B / 2 sin theta
+    M x'' = F - mu N - M (b theta'' + a theta'^2)
+
+So a piece that slides rocks only if mu is above B / H, however large the force is. It overturns
+when its centre passes the edge. An anchored piece does not move if the force stays within its
+anchors' capacity; otherwise it is treated as unanchored throughout.
 """
 
 from collections.abc import Sequence
@@ -27,7 +34,6 @@ CONCRETE_KG_M3: Final = 2400.0
 FRICTION: Final = 0.5
 """Coefficient of friction of a piece on the ground, unless given: an assumption."""
 
-_GRAVITY_M_S2: Final = 9.81
 _STEP_S: Final = 1e-4
 _AFTER_S: Final = 3.0
 
@@ -154,7 +160,7 @@ def piece_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(pieces)}, {len(time_s)})"
         )
-    from blast_env.response.kernels import rock, slide
+    from blast_env.response.kernels import move_piece
 
     rows = np.zeros((len(pieces), 4))
     steps = int(np.ceil((float(time_s[-1] - time_s[0]) + _AFTER_S) / _STEP_S))
@@ -166,8 +172,7 @@ def piece_responses(
         if held:
             rows[index] = 0.0, 0.0, np.inf, 1.0
             continue
-        weight = piece.mass_kg_m * _GRAVITY_M_S2
-        slide_m = slide(force, piece.mass_kg_m, piece.friction * weight, _STEP_S)
-        tilt, overturn_s = rock(force, piece.mass_kg_m, piece.height_m, piece.base_m, _STEP_S)
+        size = piece.mass_kg_m, piece.height_m, piece.base_m
+        slide_m, tilt, overturn_s = move_piece(force, *size, piece.friction, _STEP_S)
         rows[index] = slide_m, tilt, begin_s + overturn_s, 0.0
     return PieceResponses(*rows.T)

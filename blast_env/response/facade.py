@@ -334,6 +334,26 @@ class FacadeResponse:
         """Level of protection of the building, that of its worst component."""
         return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))
 
+    def grounds(self, target: LevelOfProtection) -> Iterator[tuple[str, bool, bool]]:
+        """Yield each component's title, whether it allows a level, and whether that is assumed.
+
+        A wall panel rests on an assumption if the limits of damage between its own and that level
+        are assumed, a broken pane if tension and tearing of its interlayer are.
+        """
+        for index, level in self.glass_levels.items():
+            glazing = self.bays[index].glazing
+            assert glazing is not None
+            tears = level < LevelOfProtection.HIGH and target < LevelOfProtection.HIGH
+            is_assumed = glazing.interlayer is not None and glazing.interlayer.is_assumed
+            yield glazing.title, level >= target, tears and is_assumed
+        most = 4 - target
+        for index, level in self.wall_levels.items():
+            wall = self.bays[index].wall
+            assert wall is not None
+            own = 4 - level
+            between = range(own, most + 1) if own <= most else range(most, own)
+            yield wall.title, own <= most, wall.section.limits.assumed >= {*between}
+
     @cached_property
     def glass_levels(self) -> dict[int, LevelOfProtection]:
         """Level of protection by the panes of each bay, by its index."""
@@ -378,18 +398,41 @@ def response_words(found: Sequence[FacadeResponse]) -> tuple[str, str, str, str]
     )
 
 
+def assumption_words(found: Iterable[FacadeResponse], target: LevelOfProtection) -> str:
+    """Return on which assumptions it rests whether facades have a level; empty without any.
+
+    If every component allows the level, all of them decide; else those that do not, and only if
+    each of these rests on an assumption.
+    """
+    every = [ground for each in found for ground in each.grounds(target)]
+    failing = [ground for ground in every if not ground[1]]
+    if failing and not all(is_assumed for *_, is_assumed in failing):
+        return ""
+    titles = dict.fromkeys(title for title, _, is_assumed in failing or every if is_assumed)
+    return f"rests on assumed properties of: {'; '.join(titles)}" if titles else ""
+
+
 def force_words(found: Iterable[FacadeResponse]) -> str:
-    """Return the largest forces that frames and connections have to carry, in a sentence."""
-    edges, supports = zip(
-        *((each.glazing.edge_force_n_m, each.walls.support_force_n_m) for each in found),
-        strict=True,
+    """Return the largest forces that frames and connections have to carry, in a sentence.
+
+    Beside that of pane edges stands the design load of frames of ASTM F2248.
+    """
+    facades = [*found]
+    edges, supports = (
+        np.concatenate(forces).max(initial=-1.0) * 1e-3
+        for forces in (
+            [each.glazing.edge_force_n_m for each in facades],
+            [each.walls.support_force_n_m for each in facades],
+        )
     )
-    carried = ", ".join(
-        f"{np.concatenate(forces).max() * 1e-3:.1f} kN/m at {words}"
-        for words, forces in (("pane edges", edges), ("the supports of wall panels", supports))
-        if sum(map(len, forces))
-    )
-    return f"frames and connections are not assessed; they have to carry {carried}"
+    carried = []
+    if edges >= 0.0:
+        panes = {each.glazing for facade in facades for each in facade.bays if each.glazing}
+        frame = 1e-3 * max(_pane(each).frame_n_m for each in panes)
+        carried.append(f"{edges:.1f} kN/m at pane edges (ASTM F2248: {frame:.1f})")
+    if supports >= 0.0:
+        carried.append(f"{supports:.1f} kN/m at the supports of wall panels")
+    return f"frames and connections are not assessed; they have to carry {', '.join(carried)}"
 
 
 def peak_factor(cell_m: float, tnt_kg: float) -> float:

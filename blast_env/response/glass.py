@@ -55,6 +55,9 @@ STATIC_FATIGUE: Final = 16.0
 LEAST_INTERLAYER_MM: Final = 1.52
 """Thickness of PVB below which laminated panes failed early in arena tests."""
 
+_ASSUMED_INTERLAYERS: Final = ((16_000.0, 0.15), (4_000.0, 0.1))
+"""Tension, N/m, and tearing share of PVB and film in the catalogue."""
+
 _REFERENCE_S: Final = 60.0
 _GRAVITY_M_S2: Final = 9.81
 _NEAR_M: Final = 1.0
@@ -132,6 +135,11 @@ class Interlayer(BaseModel):
     tension_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e9)] = 16_000.0
     tear_share: Annotated[StrictFloat, Field(ge=0.001, le=1.0)] = 0.15
 
+    @property
+    def is_assumed(self) -> bool:
+        """Whether tension and tearing are assumptions of this project."""
+        return (self.tension_n_m, self.tear_share) in _ASSUMED_INTERLAYERS
+
 
 @dataclass(frozen=True)
 class Pane:
@@ -194,6 +202,15 @@ class Pane:
     def mass_kg_m2(self) -> float:
         """Mass per area, both panes."""
         return DENSITY_KG_M3 * (self.thickness_m + self.outer_thickness_m)
+
+    def on_edges_n_m(self, pressure_pa: float) -> float:
+        """Return the mean force per length of edge under a pressure, N/m."""
+        return pressure_pa * self.area_m2 / (2.0 * (self.width_m + self.height_m))
+
+    @property
+    def frame_n_m(self) -> float:
+        """Force per length of edge that ASTM F2248 asks of frames: twice its load resistance."""
+        return self.on_edges_n_m(2.0 * self.load_resistance_pa())
 
     @property
     def middle_m(self) -> float:
@@ -343,8 +360,8 @@ class GlazingResponses:
         condition: `GlazingCondition` of broken panes; `NO_BREAK` if no larger share than the limit
             breaks (panes,).
         edge_force_n_m: Largest mean force per length of edge, N/m, which frame and joint have to
-            carry: the resistance of the unbroken pane over its edges, or the tension of the
-            interlayer of a broken one (panes,).
+            carry: the resistance of the pane over its edges until it breaks, or the tension of the
+            interlayer of a broken one (panes,). 99 of 100 panes break before the one that counts.
         hazard: The condition as a number that increases within it: below 1 no break, from 1
             retained, from 2 within 1 m, from 3 within 3 m, from 4 to 5 farther (panes,).
     """
@@ -389,7 +406,7 @@ def glazing_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
         )
-    rows, impulse_pa_s = np.zeros((len(panes), 6)), impulses(time_s, pressure_pa)
+    rows, impulse_pa_s = np.zeros((len(panes), 7)), impulses(time_s, pressure_pa)
     for index, pane in enumerate(panes):
         _bend(pane, time_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
     peak_m, probability, break_s, *_ = rows.T
@@ -420,7 +437,7 @@ def glazing_responses(
         flight,
         hit,
         condition.astype(np.float64),
-        _edge_forces_n_m(panes, peak_m, probability > limit_probability),
+        _edge_forces_n_m(panes, rows[:, 6], probability > limit_probability),
         hazard,
     )
 
@@ -440,7 +457,7 @@ def drawn_conditions(
         draws: Factors on pressures, factors on times, and the share of panes that are weaker, above
             0 and below 1 (draws,).
     """
-    rows, impulse_pa_s = np.zeros((len(draws[0]), 6)), impulses(time_s, pressure_pa)
+    rows, impulse_pa_s = np.zeros((len(draws[0]), 7)), impulses(time_s, pressure_pa)
     for row, (peak, duration, weaker) in zip(rows, np.transpose(draws).tolist(), strict=True):
         loads = duration * time_s, peak * pressure_pa, peak * duration * impulse_pa_s
         _bend(pane, *loads, -np.log1p(-weaker), row)
@@ -483,10 +500,10 @@ def _thrown(
     """Return the stretched share, and speed, flight and height of impact of fragments (panes,).
 
     Args:
-        rows: The bending, as `blast_env.response.kernels.bend` writes it (panes, 6).
+        rows: The bending, as `blast_env.response.kernels.bend` writes it (panes, 7).
         thrown_by: `Pane.thrown_by` of each (panes, 5).
     """
-    _, _, _, break_m, break_m_s, left_pa_s = rows.T
+    _, _, _, break_m, break_m_s, left_pa_s, _ = rows.T
     klm, mass, middle_m, stiffness, tear_m = thrown_by.T
     # The net impulse so far is K_LM m v: fragments fly on with it and the remaining impulse.
     thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
@@ -496,13 +513,12 @@ def _thrown(
     return stretched, speed, flight, _hit_height_m(middle_m, speed)
 
 
-def _edge_forces_n_m(panes: Sequence[Pane], peak_m: FloatArray, broken: BoolArray) -> FloatArray:
-    """Return the mean force on the edges of panes with a largest deflection, N/m (panes,)."""
+def _edge_forces_n_m(panes: Sequence[Pane], whole_m: FloatArray, broken: BoolArray) -> FloatArray:
+    """Return the mean force on the edges of panes with a deflection until breakage (panes,)."""
     forces = []
-    for pane, deflection_m, is_broken in zip(panes, peak_m, broken, strict=True):
+    for pane, deflection_m, is_broken in zip(panes, whole_m, broken, strict=True):
         reached_m, pressure_pa, _ = pane.curve.bending
-        edge_m = 2.0 * (pane.width_m + pane.height_m)
-        force = float(np.interp(deflection_m, reached_m, pressure_pa)) * pane.area_m2 / edge_m
+        force = pane.on_edges_n_m(float(np.interp(deflection_m, reached_m, pressure_pa)))
         holds = pane.interlayer
         forces.append(max(force, holds.tension_n_m) if is_broken and holds else force)
     return np.array(forces)

@@ -11,6 +11,9 @@ from numba import njit
 
 from blast_env.arrays import FloatArray
 
+_STRONGEST: Final = -np.log(0.01)
+"""The risk B at which 99 of 100 panes have broken."""
+
 _MOST_TIMES: Final = 50
 """Limit of the number of steps, in multiples of those for the load and one period."""
 
@@ -139,7 +142,8 @@ def bend(
     """Integrate the bending of an unbroken pane, and find its breakage.
 
     Writes to `out` the largest deflection and the share of panes that break, then the time, the
-    deflection, the speed and the largest impulse still to come at breakage. Slopes are those of the
+    deflection, the speed and the largest impulse still to come at breakage, and the largest
+    deflection of the strongest of a hundred panes until it breaks. Slopes are those of the
     segments before the points; the damage to the power `exponent` is the risk B. The pane breaks at
     the risk `strength`; if that is 0, as the median of the panes that break.
     """
@@ -182,51 +186,66 @@ def bend(
             left = max(left, come)
     out[0], out[1], out[2] = peak, share, break_s
     out[3], out[4], out[5] = track[1, broken], track[2, broken], left
+    last = np.searchsorted(track[0], _STRONGEST ** (1.0 / exponent))
+    out[6] = max(0.0, track[1, : last + 1].max())
 
 
 @njit(cache=True)
-def slide(force: FloatArray, mass: float, friction: float, step_s: float) -> float:
-    """Return the largest sliding displacement; force, mass and friction are per metre of length."""
-    x, v, most = 0.0, 0.0, 0.0
-    for push in force:
-        if v == 0.0:
-            net = max(abs(push) - friction, 0.0) * (1.0 if push >= 0.0 else -1.0)
-        else:
-            net = push - friction * (1.0 if v > 0.0 else -1.0)
-        new_v = v + net / mass * step_s
-        if v != 0.0 and new_v * v < 0.0:
-            new_v = 0.0  # friction stops it, but does not reverse it
-        x += 0.5 * (v + new_v) * step_s
-        v = new_v
-        most = max(most, abs(x))
-    return most
+def move_piece(
+    force: FloatArray, mass: float, height: float, base: float, friction: float, step_s: float
+) -> tuple[float, float, float]:
+    """Return how far a rigid piece slides, its largest tilt, and when it overturns.
 
+    The force acts on the side of the piece at half its height; it and the mass are per metre of
+    length. The tilt is over that of overturning. The time in s counts from the first step, and is
+    infinite if the piece does not overturn.
 
-@njit(cache=True)
-def rock(
-    force: FloatArray, mass: float, height: float, base: float, step_s: float
-) -> tuple[float, float]:
-    """Return the largest tilt over the tilt of overturning, and the time of overturning in s.
+    A step, for a piece on the edge towards which it tips (`blast_env.response.barriers`):
 
-    The time counts from the first step and is infinite if the piece does not overturn.
+    1. the edge holds: angular acceleration about it, and the friction and weight that it takes;
+    2. if that friction is more than the edge has, or the piece slides already: the edge slides,
+       with its friction as the only moment that lifts the piece;
+    3. flat on the ground without a moment that lifts it, it slides alone;
+    4. friction stops a sliding piece, but does not reverse it; it lands without bouncing.
     """
-    inertia = mass * (height * height + base * base) / 3.0
+    inertia = mass * (height * height + base * base) / 12.0
     limit = np.arctan(base / height)
-    angle, speed, most = 0.0, 0.0, 0.0
+    x, v, angle, speed, far, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for step, push in enumerate(force):
-        side = 1.0 if angle > 0.0 or (angle == 0.0 and push >= 0.0) else -1.0
-        size = abs(angle)
-        weight = 0.5 * mass * 9.81 * (base * np.cos(size) - height * np.sin(size))
-        moment = 0.5 * height * push * np.cos(size) - side * weight
-        if angle == 0.0 and side * moment <= 0.0:
-            speed = 0.0
-            continue
-        speed += moment / inertia * step_s
-        new_angle = angle + speed * step_s
-        if angle != 0.0 and new_angle * angle < 0.0:
-            new_angle, speed = 0.0, 0.0  # it lands on its base without bouncing
-        angle = new_angle
-        most = max(most, abs(angle))
+        if angle == 0.0:
+            side = 1.0 if v > 0.0 or (v == 0.0 and push >= 0.0) else -1.0
+        else:
+            side = 1.0 if angle > 0.0 else -1.0
+        # from here on in the direction of the edge
+        own, own_v, tilt, turning = side * push, side * v, abs(angle), side * speed
+        arm = 0.5 * (base * np.cos(tilt) - height * np.sin(tilt))
+        rise = 0.5 * (height * np.cos(tilt) + base * np.sin(tilt))
+        tipping = 0.5 * own * height * np.cos(tilt)
+        turns = (tipping - mass * 9.81 * arm) / (inertia + mass * (arm * arm + rise * rise))
+        if tilt == 0.0 and turns <= 0.0:
+            turns = 0.0
+        slides, held = 0.0, own - mass * (turns * rise + turning * turning * arm)
+        weight = max(mass * (9.81 + turns * arm - turning * turning * rise), 0.0)
+        if own_v != 0.0 or abs(held) > friction * weight:
+            against = friction if own_v > 0.0 or (own_v == 0.0 and held > 0.0) else -friction
+            lever = against * rise - arm
+            off = 0.5 * own * base * np.sin(tilt)
+            turns = mass * (9.81 - turning * turning * rise) * lever - off
+            turns /= inertia - mass * arm * lever
+            if tilt == 0.0 and turns <= 0.0:
+                turns = 0.0
+            weight = max(mass * (9.81 + turns * arm - turning * turning * rise), 0.0)
+            slides = (own - against * weight) / mass - turns * rise - turning * turning * arm
+        new_v = own_v + slides * step_s
+        if own_v * new_v < 0.0:
+            new_v = 0.0
+        x += side * 0.5 * (own_v + new_v) * step_s
+        turning += turns * step_s
+        tilt += turning * step_s
+        if tilt <= 0.0:
+            tilt, turning = 0.0, 0.0
+        v, speed, angle = side * new_v, side * turning, side * tilt
+        far, most = max(far, abs(x)), max(most, tilt)
         if most >= limit:
-            return most / limit, step * step_s
-    return most / limit, np.inf
+            return far, most / limit, step * step_s
+    return far, most / limit, np.inf

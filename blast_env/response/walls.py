@@ -51,11 +51,13 @@ class Limits:
             without a limit.
         rotation_deg: Support rotation at these limits, degrees; `None` without a limit.
         source: Source of the limits, or a statement that they are assumptions.
+        assumed: The levels of damage whose limits are assumptions.
     """
 
     ductility: tuple[float | None, float | None, float | None, float | None]
     rotation_deg: tuple[float | None, float | None, float | None, float | None]
     source: str
+    assumed: frozenset[DamageLevel] = frozenset()
 
     def measure(self, ductility: FloatArray, rotation_deg: FloatArray) -> FloatArray:
         """Return the damage as a number: below 1 superficial, from 1 moderate, from 4 blowout.
@@ -93,13 +95,15 @@ def damage_level(measure: FloatArray) -> list[DamageLevel]:
     return [DamageLevel(int(min(each, 4.0))) for each in measure.tolist()]
 
 
-_PDC_TABLES: Final = "PDC-TR 06-08, tables 3-1 and 3-3"
+_PDC_TABLES: Final = "PDC-TR 06-08, tables 3-1 and 3-3, as others quote them"
 _BETWEEN: Final = "the limit of heavy damage is an assumption between those of the tables"
+_NOT_READ: Final = "no public table could be read, so the limits are assumptions of this project"
 
 CONCRETE_LIMITS: Final = Limits(
     (1.0, None, None, None),
     (None, 2.0, 5.0, 10.0),
     f"{_PDC_TABLES}: 1, 2 and 10 degrees; {_BETWEEN}",
+    frozenset({DamageLevel.HEAVY}),
 )
 """Reinforced concrete in bending, single reinforcement."""
 
@@ -107,16 +111,26 @@ MASONRY_LIMITS: Final = Limits(
     (1.0, None, None, None),
     (None, 1.5, 4.0, 8.0),
     f"{_PDC_TABLES}: 1, 1.5 and 8 degrees; {_BETWEEN}",
+    frozenset({DamageLevel.HEAVY}),
 )
 """Unreinforced masonry in bending."""
 
-_ASSUMED: Final = (
-    "assumption of this project: no public table was found; give own limits to change it"
-)
+_ALL: Final = frozenset(DamageLevel) - {DamageLevel.BLOWOUT}
 
-REINFORCED_MASONRY_LIMITS: Final = Limits((1.0, None, None, None), (None, 2.0, 8.0, 15.0), _ASSUMED)
-STEEL_LIMITS: Final = Limits((1.0, 3.0, 6.0, 10.0), (None, None, None, None), _ASSUMED)
-TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _ASSUMED)
+REINFORCED_MASONRY_LIMITS: Final = Limits(
+    CONCRETE_LIMITS.ductility,
+    CONCRETE_LIMITS.rotation_deg,
+    f"{_NOT_READ}: those of reinforced concrete, safer than others in use (2, 8 and 15 degrees)",
+    _ALL,
+)
+STEEL_LIMITS: Final = Limits(
+    (0.5, 0.8, 0.9, 1.0),
+    (None, None, None, None),
+    f"{_NOT_READ}: those in use for studs with a slip track at the top, which buckle before they"
+    " yield, safer than for studs tied at both ends (0.5, 1, 2 and 3)",
+    _ALL,
+)
+TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _NOT_READ, _ALL)
 
 
 class _Section(BaseModel):
@@ -261,6 +275,9 @@ class Masonry(_Section):
         return MASONRY_LIMITS
 
 
+_Ductility = Annotated[StrictFloat, Field(gt=0.0, le=100.0)]
+
+
 class Sheeting(_Section):
     """Other elastic-plastic sections: studs, timber, reinforced block.
 
@@ -269,6 +286,8 @@ class Sheeting(_Section):
         bending_stiffness_n_m: E I per metre of width.
         mass_kg_m2: Mass per area.
         material: Material, which determines the limits of damage.
+        ductility: Other limits: the ductility at the end of superficial, moderate, heavy and
+            hazardous damage.
     """
 
     kind: Literal["sheeting"] = "sheeting"
@@ -276,10 +295,20 @@ class Sheeting(_Section):
     bending_stiffness_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e12)]
     mass_kg_m2: Annotated[StrictFloat, Field(ge=0.1, le=1e5)]
     material: Literal["steel", "timber", "reinforced_masonry"]
+    ductility: tuple[_Ductility, _Ductility, _Ductility, _Ductility] | None = None
+
+    @model_validator(mode="after")
+    def _check_ductility(self) -> Self:
+        """Refuse limits that do not ascend."""
+        if self.ductility is not None and list(self.ductility) != sorted({*self.ductility}):
+            raise ValueError(f"ductility is {self.ductility}, must ascend")
+        return self
 
     @property
     def limits(self) -> Limits:
-        """Limits of the material."""
+        """The given limits, or those of the material."""
+        if self.ductility is not None:
+            return Limits(self.ductility, (None, None, None, None), "given")
         known = {
             "steel": STEEL_LIMITS,
             "timber": TIMBER_LIMITS,

@@ -9,7 +9,15 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue, find_component
-from blast_env.response.facade import Bay, FilledBay, divide, force_words, peak_corrected, respond
+from blast_env.response.facade import (
+    Bay,
+    FilledBay,
+    assumption_words,
+    divide,
+    force_words,
+    peak_corrected,
+    respond,
+)
 from blast_env.response.glass import GlazingCondition, Interlayer
 from blast_env.response.walls import panel_responses
 
@@ -153,3 +161,45 @@ def test_thin_interlayers_are_named_and_films_are_not() -> None:
     assert found.thin_interlayers == (0.76,)
     assert "pane edges" in force_words([found])
     assert "wall panels" not in force_words([found])
+    assert "ASTM F2248" in force_words([found])
+
+
+def words_on(
+    target: LevelOfProtection, peak_pa: float, impulse_pa_s: float, *filled: FilledBay
+) -> str:
+    history = np.tile([peak_pa, 0.0], (len(filled), 1))
+    found = respond(filled, np.array([0.0, 2.0 * impulse_pa_s / peak_pa]), history)
+    return assumption_words([found], target)
+
+
+def test_a_level_that_rests_on_assumed_properties_names_them() -> None:
+    studs, concrete = (FilledBay(bay(), wall=wall(each)) for each in ("steel_stud", "concrete_200"))
+    plain, laminated = (
+        FilledBay(bay(), glazing(each)) for each in ("window_annealed_6", "window_laminated_12")
+    )
+    medium = LevelOfProtection.MEDIUM
+    calm, hard = (2e3, 10.0), (28e3, 200.0)
+    studs_words = "rests on assumed properties of: steel studs in slip tracks, with brick veneer"
+    assert words_on(medium, *calm, studs, concrete) == studs_words
+    assert words_on(medium, *calm, concrete, laminated) == ""  # the pane does not break
+    assert "12" not in words_on(LevelOfProtection.HIGH, *hard, laminated)
+    assert "laminated, 6 + 6 mm" in words_on(medium, *hard, laminated)  # it breaks and is retained
+    assert words_on(medium, *hard, studs) == studs_words  # it fails by the assumed limits
+    assert words_on(medium, *hard, studs, plain) == ""  # the plain pane fails without any
+    given = studs.wall.section.model_copy(update={"ductility": (0.5, 1.0, 2.0, 3.0)})  # type: ignore[union-attr]
+    own = FilledBay(bay(), wall=studs.wall.model_copy(update={"section": given}))  # type: ignore[union-attr]
+    assert words_on(medium, *calm, own) == ""
+
+
+def test_the_heavy_limit_of_concrete_counts_only_between_its_neighbours() -> None:
+    concrete = FilledBay(bay(), wall=wall("concrete_150"))
+    low = LevelOfProtection.LOW
+    assert words_on(low, 28e3, 200.0, concrete) == ""  # within the limit of moderate damage
+    assert words_on(low, 3e6, 6000.0, concrete) == ""  # beyond that of hazardous damage
+    assert "reinforced concrete wall, 150 mm" in words_on(low, 300e3, 1500.0, concrete)
+
+
+def test_all_interlayers_of_the_catalogue_are_assumed() -> None:
+    layers = [each.interlayer for each in catalogue().values() if isinstance(each, Glazing)]
+    assert all(each.is_assumed for each in layers if each is not None)
+    assert not Interlayer(tension_n_m=12_000.0).is_assumed

@@ -149,6 +149,17 @@ def test_a_frame_carries_the_load_of_an_unbroken_pane_over_its_edges() -> None:
     assert found.edge_force_n_m[0] == pytest.approx(load * 1.6 * 1.0 / (2.0 * 2.6), rel=0.02)
 
 
+def test_a_frame_carries_a_pane_until_it_breaks() -> None:
+    """6 mm annealed under 20 kg at 10 m: not the 99 kN/m of a pane that bends on."""
+    pane = Pane(1.2, 1.5, 5.56e-3)
+    found = glazing_responses([pane], *blast(196.6e3, 480.5))
+    assert found.break_probability[0] > 0.99
+    assert 5_000.0 < found.edge_force_n_m[0] < 8_000.0
+    assert pane.frame_n_m == pytest.approx(2.0 * pane.load_resistance_pa() / 3.0)
+    whole, harder = (glazing_responses([pane], *blast(kpa * 1e3, 400.0)) for kpa in (100, 400))
+    assert harder.edge_force_n_m[0] < 2.0 * whole.edge_force_n_m[0]  # not four times
+
+
 def test_a_broken_laminated_pane_pulls_at_its_frame() -> None:
     pane = Pane(1.6, 1.0, 5.84e-3, interlayer=Interlayer())
     found = glazing_responses([pane], *blast(20e3, 100.0))

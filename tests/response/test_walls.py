@@ -1,10 +1,19 @@
 """Wall panels and pieces of a barrier: strengths by hand, energy, thresholds, damage."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.screening import stand_offs
 from blast_env.response.barriers import RigidPiece, Standing, piece_responses
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Wall, catalogue
+from blast_env.response.kernels import move_piece
 from blast_env.response.walls import (
     CONCRETE_LIMITS,
     DamageLevel,
@@ -17,6 +26,7 @@ from blast_env.response.walls import (
     load_mass_factors,
     panel_responses,
 )
+from blast_env.site.blast_site import Charge
 
 STEEL = Sheeting(moment_n=3000.0, bending_stiffness_n_m=1.2e5, mass_kg_m2=45.0, material="steel")
 
@@ -163,17 +173,65 @@ def test_less_than_friction_and_weight_moves_nothing() -> None:
 
 
 def test_the_impulse_that_overturns_by_energy() -> None:
-    """I w^2 / 2 = M g (r - H / 2), with i H H / 2 = I w about the edge."""
-    inertia = PIECE.mass_kg_m * (1.0 + 0.36) / 3.0
+    """I w^2 / 2 = M g (r - H / 2), with i H H / 2 = I w about an edge that holds."""
+    piece = replace(PIECE, friction=2.0)
+    inertia = piece.mass_kg_m * (1.0 + 0.36) / 3.0
     lift = 0.5 * (np.hypot(1.0, 0.6) - 1.0)
-    impulse = inertia * np.sqrt(2.0 * PIECE.mass_kg_m * 9.81 * lift / inertia) / 0.5
+    impulse = inertia * np.sqrt(2.0 * piece.mass_kg_m * 9.81 * lift / inertia) / 0.5
     less, more = (
-        piece_responses([PIECE], *triangle(500.0 * impulse, factor * impulse))
+        piece_responses([piece], *triangle(500.0 * impulse, factor * impulse))
         for factor in (0.93, 1.07)
     )
     assert less.tilt[0] < 1.0 <= more.tilt[0]
     assert np.isinf(less.overturn_s[0])
     assert more.standing == [Standing.OVERTURNS]
+
+
+@given(
+    height_m=st.floats(0.5, 4.0),
+    share=st.floats(0.1, 2.0),
+    friction=st.floats(0.0, 1.5),
+    impulse=st.floats(100.0, 1e4),
+)
+@settings(max_examples=40)
+def test_a_piece_rocks_only_with_friction_above_base_over_height(
+    height_m: float, share: float, friction: float, impulse: float
+) -> None:
+    """Less friction cannot lift it, however large the load is: it slides."""
+    piece = RigidPiece(height_m, share * height_m, 1000.0, friction)
+    found = piece_responses([piece], *triangle(100.0 * impulse, impulse))
+    if friction < 0.999 * share:
+        assert found.tilt[0] == 0.0
+        speed = impulse * height_m / 1000.0
+        if friction > 0.1:
+            expected = speed**2 / (2.0 * friction * 9.81)
+            assert found.slide_m[0] <= expected * 1.01 + 1e-3
+
+
+def test_a_planter_of_one_metre_slides() -> None:
+    """1 x 1 m with friction 0.5 under 20 kg at 3 m; its edge would have held with friction 2."""
+    load = triangle(4e6, 3000.0)
+    planter = RigidPiece.of_block(2.0, 1.0, 1.0)
+    assert piece_responses([planter], *load).standing == [Standing.SLIDES]
+    held = replace(planter, friction=2.0)
+    assert piece_responses([held], *load).standing != [Standing.SLIDES]
+
+
+def test_friction_at_the_edge_limits_the_moment() -> None:
+    """From rest, theta'' = g (mu b - a) / (I / M - a (mu b - a)), whatever the force is."""
+    piece = RigidPiece(2.0, 0.5, 1000.0, friction=0.5)
+    lever = 0.5 * 1.0 - 0.25
+    inertia = (4.0 + 0.25) / 12.0
+    turns = 9.81 * lever / (inertia - 0.25 * lever)
+    lasts_s = 0.02
+    limit = np.arctan(0.25)
+    for force in (2e4, 2e5):
+        time_s = np.array([0.0, lasts_s])
+        moved = move_piece(np.full(200, 2.0 * force), 1000.0, 2.0, 0.5, 0.5, 1e-4)
+        assert moved[1] * limit == pytest.approx(0.5 * turns * lasts_s**2, rel=0.03)
+        found = piece_responses([piece], time_s, np.full((1, 2), force))
+        assert found.tilt[0] > 0.0
+        assert found.slide_m[0] > 0.0
 
 
 def test_the_side_that_is_pushed_does_not_matter() -> None:
@@ -194,6 +252,19 @@ def test_anchors_hold_up_to_their_capacity() -> None:
     found = piece_responses([weak, strong], time_s, np.repeat(pressure, 2, axis=0))
     assert found.held.tolist() == [0.0, 1.0]
     assert found.standing[1] is Standing.STANDS
+
+
+def test_studs_have_the_limits_of_walls_that_buckle() -> None:
+    """100 kg, medium: 72 m with slip tracks, 58 m where both ends are tied."""
+    studs = catalogue()["steel_stud"]
+    assert isinstance(studs, Wall)
+    tied = studs.section.model_copy(update={"ductility": (0.5, 1.0, 2.0, 3.0)})
+    names = {"slip": studs, "tied": studs.model_copy(update={"section": tied})}
+    found = stand_offs(names, Charge((0.0, 0.0), 100.0))
+    medium_m = [each.distances_m[LevelOfProtection.MEDIUM] for each in found]
+    assert medium_m == pytest.approx([72.0, 58.0], abs=1.0)
+    with pytest.raises(ValidationError, match="must ascend"):
+        Sheeting(**STEEL.model_dump() | {"ductility": (1.0, 1.0, 2.0, 3.0)})
 
 
 def test_wrong_pieces() -> None:
