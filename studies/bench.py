@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, print_table, progress_bar, user_errors
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine, simulate
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import CELLS, UNIFORM
 from blast_env.site import Scenario, load_scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
+from studies.side_by_side import ROWS, SideError, compare
 
 ENV_ID: Final = "BlastBarrier-v0"
 LARGE: Final = "large"
@@ -440,6 +441,33 @@ def _print_sites(sites: Sequence[Scenario], cells: Sequence[str]) -> None:
     print_line(_ELSEWHERE)
 
 
+def _print_ratios(older: Path, names: Sequence[str], turns: int) -> None:
+    unknown = [each for each in names if each not in ROWS]
+    if unknown:
+        raise UnknownNameError("row", unknown[0], list(ROWS))
+    if not (older / "blast_env" / "__init__.py").is_file():
+        raise BlastEnvError(f"--against is {older}, must be the folder of a checkout")
+    newer, chosen = Path(__file__).resolve().parents[1], list(names or ROWS)
+    rows = []
+    with progress_bar("rows") as progress:
+        try:
+            for found in compare(older.resolve(), newer, chosen, turns):
+                old_s, new_s = median(found.old_s), median(found.new_s)
+                rows.append(
+                    (
+                        *(found.row.title, found.row.unit),
+                        *(f"{1.0 / each:,.4g}" for each in (old_s, new_s)),
+                        f"{found.ratio:.2f}",
+                        f"{min(found.ratios):.2f} to {max(found.ratios):.2f}",
+                    )
+                )
+                progress(len(rows) / len(chosen))
+        except SideError as error:
+            raise BlastEnvError(str(error)) from error
+    title = f"per CPU s, medians of {turns} turns"
+    print_table(title, ("work", "unit", "older", "this one", "ratio", "of the turns"), rows, 2)
+
+
 def main(
     scenario: Annotated[
         list[str] | None, typer.Option(help="A scenario, else courtyard. May be repeated.")
@@ -468,6 +496,17 @@ def main(
         list[float] | None,
         typer.Option(help="With --site large: 20 to 200 m, else 20, 50 and 100. May be repeated."),
     ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            help="Only the ratios of costs to those of an older checkout in this folder, measured "
+            "in turns: above 1 this one is faster."
+        ),
+    ] = None,
+    row: Annotated[
+        list[str] | None,
+        typer.Option(help=f"With --against: {', '.join(ROWS)}, else all. May be repeated."),
+    ] = None,
 ) -> None:
     """Time blasts and the environment on this machine, and measure the memory."""
     with user_errors():
@@ -475,6 +514,12 @@ def main(
             raise BlastEnvError("--length needs --site large")
         if cells and not site:
             raise BlastEnvError("--cells needs --site")
+        if row and against is None:
+            raise BlastEnvError("--row needs --against")
+        if against is not None:
+            print_line(hardware())
+            _print_ratios(against, row or (), repeats)
+            return
         if site:
             sites = list(_sites(site, length or ()))
             print_line(hardware())

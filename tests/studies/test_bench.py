@@ -1,6 +1,7 @@
 """The cost of blasts and environments, and the tables of it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from typer import Typer
@@ -11,6 +12,7 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_site import draw_charge
 from studies import bench
 from studies.bench import SiteCost, blast_cost, site_cost, street
+from studies.side_by_side import ROWS, compare
 from tests.envs.small import small_document
 
 
@@ -73,3 +75,26 @@ def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
     rows = [line.split()[:2] for line in result.output.splitlines()]
     assert ["street_20_m", "coarse"] in rows
     assert ["visitor_entrance", "coarse"] in rows
+
+
+# --- Two checkouts side by side.
+
+
+def test_a_checkout_costs_what_it_costs_itself() -> None:
+    """Each side measures in a process of its own, here of the same checkout."""
+    root = Path(bench.__file__).resolve().parents[1]
+    (found,) = compare(root, root, ["one"], turns=1)
+    assert found.row is ROWS["one"]
+    assert 0.25 < found.ratio == found.ratios[0] < 4.0
+
+
+def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
+    assert "must be the folder of a checkout" in run("--against", str(tmp_path)).output
+    assert "needs --against" in run("--row", "one").output
+    assert "did you mean 'one'" in run("--against", str(tmp_path), "--row", "onne").output
+    package = tmp_path / "blast_env"
+    package.mkdir()
+    (package / "__init__.py").write_text("raise RuntimeError('an older one')")
+    failed = run("--against", str(tmp_path), "--row", "one")
+    assert failed.exit_code != 0
+    assert "row 'one': RuntimeError: an older one" in " ".join(failed.output.split())
