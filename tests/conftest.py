@@ -32,6 +32,7 @@ multiprocessing.get_start_method()
 
 
 hypothesis.settings.register_profile("quick", max_examples=30, deadline=None)
+hypothesis.settings.register_profile("many", max_examples=2000, deadline=None)
 hypothesis.settings.load_profile("quick")
 
 
