@@ -58,7 +58,7 @@ def _guesses() -> Any:
 
 
 def batch(scenario: str, observation: str = "features", warm_up: int = _STEPS) -> Measure:
-    """Return what times steps of a batch on guesses, without the time to choose the actions."""
+    """Return a timer of steps of a batch on guesses, without the time to choose the actions."""
     import gymnasium as gym
 
     import blast_env  # noqa: F401  # registers the environments
@@ -94,7 +94,7 @@ def batch(scenario: str, observation: str = "features", warm_up: int = _STEPS) -
 
 
 def single(scenario: str) -> Measure:
-    """Return what times steps of one environment on guesses, without choosing the actions."""
+    """Return a timer of steps of one environment on guesses, without choosing the actions."""
     import gymnasium as gym
 
     import blast_env  # noqa: F401  # registers the environments
@@ -128,7 +128,7 @@ def single(scenario: str) -> Measure:
 
 
 def gas_blast(scenario: str, cell_m: float = 0.5) -> Measure:
-    """Return what times a blast by gas dynamics without a barrier, from scenario to loads."""
+    """Return a timer of a blast by gas dynamics without a barrier, from scenario to loads."""
     import blast_env
 
     def measure() -> tuple[float, int]:

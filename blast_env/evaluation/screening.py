@@ -129,7 +129,7 @@ class ScreenedThreat:
         return bool(self.nearest_m < CHECKED_SCALED_DISTANCE[0] * np.cbrt(self.charge.tnt_kg))
 
     def doubts(self, required: Sequence[Requirement]) -> str:
-        """Return what a verdict on requirements is subject to, in brackets; empty if nothing."""
+        """Return the conditions of a verdict on requirements, in brackets; empty without any."""
         found = [each.response for each in self.bays]
         rests = any(assumption_words(found, each.level) for each in required if each.level)
         doubts = ["may be breached"] * self.may_breach + ["rests on assumptions"] * rests
