@@ -59,19 +59,6 @@ def test_another_name_is_an_error_as_of_any_module() -> None:
         blast_env.explode  # noqa: B018
 
 
-def test_no_two_public_classes_share_a_name() -> None:
-    """A name that a reader looks up leads to one place, in the library and in what is about it."""
-    repository = Path(__file__).parents[1]
-    places: dict[str, list[str]] = {}
-    for folder in ("blast_env", "agents/blast_agents", "studies"):
-        for path in sorted((repository / folder).rglob("*.py")):
-            for node in ast.parse(path.read_text(encoding="utf-8")).body:
-                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                    places.setdefault(node.name, []).append(str(path.relative_to(repository)))
-    assert len(places) > 300
-    assert {name: where for name, where in places.items() if len(where) > 1} == {}
-
-
 # --- What records say of the versions and the code.
 
 

@@ -26,7 +26,7 @@ _TARGETS: Final = "blast_env.targets"
 
 
 PICTURES = (".png", ".svg", ".pdf")
-"""Suffixes of pictures, equal to `rendering.figures.FIGURE_SUFFIXES`, without its extra."""
+"""Suffixes of pictures, equal to `blast_env.plots.figures.FIGURE_SUFFIXES`, without its extra."""
 
 
 class Target(NamedTuple):

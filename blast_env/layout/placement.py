@@ -1,4 +1,4 @@
-"""LayoutState of modules or pieces: legal places and legal layouts."""
+"""Placement of modules and pieces in a build zone: legal places and legal layouts."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence

@@ -229,28 +229,28 @@ class BlastResult:
 
     @cached_property
     def collisions(self) -> "pd.DataFrame":
-        """One row per collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
+        """One row per collision; the columns are `blast_env.particles.tables.COLLISION_COLUMNS`."""
         from blast_env.particles.tables import collision_table
 
         return collision_table(self.collision_array, self.obstacles)
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
-        """One row per module; the columns are `recording.tables.MODULE_COLUMNS`."""
+        """One row per module; the columns are `blast_env.particles.tables.MODULE_COLUMNS`."""
         from blast_env.particles.tables import module_table
 
         return module_table(self.obstacles)
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
-        """One row per structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
+        """One row per structure; the columns are `blast_env.particles.tables.STRUCTURE_COLUMNS`."""
         from blast_env.particles.tables import structure_table
 
         return structure_table(self.obstacles)
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
-        """One row per building; the columns are `recording.tables.BUILDING_COLUMNS`."""
+        """One row per building; the columns are `blast_env.particles.tables.BUILDING_COLUMNS`."""
         from blast_env.particles.tables import building_table
 
         return building_table(self.structures, self.blast.scenario.building_names)
