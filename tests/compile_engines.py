@@ -12,15 +12,20 @@ from blast_env import load_scenario, simulate
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
-from blast_env.gas.faces import ground_faces
-from blast_env.gas.grid import GasGrid
-from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
-from blast_env.gas.solver import GasSolver, Settling
-from blast_env.gas.source import GasCharge, set_charge
-from blast_env.layout.build_site import draw_charge
+from blast_env.gas import (
+    FaceLoads,
+    GasCharge,
+    GasGrid,
+    GasSolver,
+    Gauges,
+    GroundMap,
+    Settling,
+    ground_faces,
+    set_charge,
+)
+from blast_env.layout import draw_charge
 from blast_env.site import Scenario
-from blast_env.surrogate.relations import relations
-from blast_env.surrogate.ways import Ways
+from blast_env.surrogate import Ways, relations
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
 

@@ -13,9 +13,9 @@ from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.standing import NOT_KNOWN
-from blast_env.gas.engine import GasRun
+from blast_env.gas import GasRun
 from blast_env.results import EndReason
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge
 from tests.builders import block
 from tests.gas_sites import WALL, hut
 

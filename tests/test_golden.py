@@ -20,8 +20,7 @@ from typing import Final, NamedTuple
 import pytest
 
 from blast_env.evaluation.engines import simulate
-from blast_env.site import Scenario, bundled_scenarios, load_scenario
-from blast_env.site.parameters import parameters_digest
+from blast_env.site import Scenario, bundled_scenarios, load_scenario, parameters_digest
 from tests.builders import block, site, square, zone
 from tests.digests import CONDITIONS, Condition, need_the_same_bits
 

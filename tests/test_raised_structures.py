@@ -12,9 +12,8 @@ from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
-from blast_env.plots.plan import structure_features
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.plots import structure_features
+from blast_env.site import Charge, Scenario
 from blast_env.sites import Visibility
 from blast_env.surrogate import packaged_surrogate, site_of
 from tests.builders import block

@@ -13,8 +13,8 @@ import pytest
 from blast_env import Charge, Scenario, load_scenario, simulate
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.layout.build_site import draw_charge
-from blast_env.particles.balls import CollisionType
+from blast_env.layout import draw_charge
+from blast_env.particles import CollisionType
 from blast_env.runner import run_all
 from blast_env.site import ScenarioError
 from tests.pieces_of_work import kill, square, workers_within

@@ -14,15 +14,11 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.geometry import Layout, Piece
-from blast_env.io.export import LayoutPlan, export_layout
-from blast_env.io.export.dxf import drawing
+from blast_env.io.export import LayoutPlan, drawing, export_layout
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import build_site, vehicle_drive
-from blast_env.plots.plan import Kinds, on_levels, site_features
-from blast_env.site import Scenario, ScenarioError
-from blast_env.site.blast_site import Charge
-from blast_env.site.heights import highest_top_m
+from blast_env.layout import LayoutState, build_site, vehicle_drive
+from blast_env.plots import Kinds, on_levels, site_features
+from blast_env.site import Charge, Scenario, ScenarioError, highest_top_m
 from blast_env.sites import Visibility
 from blast_env.surrogate import packaged_surrogate, site_of
 from tests import builders

@@ -1,1 +1,34 @@
 """The choice of a layout: rules, optimisers, and the surrogate of the gas engine."""
+
+from blast_env.design.bollards import line_of_posts, posts_and_wall
+from blast_env.design.rules import (
+    NEAR_BUILDING,
+    NEAR_CHARGE,
+    expected_charge,
+    hardening_alone,
+    hardening_and_sight_lines,
+    line_of_sight_wall,
+    random_layout,
+    ring_around_building,
+    ring_around_charge,
+    wall_near_building,
+    wall_near_charge,
+    why_no_wall,
+)
+
+__all__ = [
+    "NEAR_BUILDING",
+    "NEAR_CHARGE",
+    "expected_charge",
+    "hardening_alone",
+    "hardening_and_sight_lines",
+    "line_of_posts",
+    "line_of_sight_wall",
+    "posts_and_wall",
+    "random_layout",
+    "ring_around_building",
+    "ring_around_charge",
+    "wall_near_building",
+    "wall_near_charge",
+    "why_no_wall",
+]

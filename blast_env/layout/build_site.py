@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from blast_env.geometry import Element, Layout, standing
-from blast_env.layout import LayoutState, check_layout, usable_cells
+from blast_env.layout.placement import LayoutState, check_layout, usable_cells
 from blast_env.site import (
     AnyCharge,
     Scenario,

@@ -4,8 +4,15 @@ from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.problems import Problem, ScenarioError
 from blast_env.sections import Site
-from blast_env.site.blast_site import Charge
-from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
+from blast_env.site.blast_site import OUTWARDS, WALLS, BlastSite, Charge, Gauge, StructureOutline
+from blast_env.site.catalogue import (
+    Catalogue,
+    Hardening,
+    Item,
+    PlacedModule,
+    StockBarrier,
+    stock_barriers,
+)
 from blast_env.site.content import SCHEMA_VERSION
 from blast_env.site.files import (
     AnyScenario,
@@ -16,61 +23,114 @@ from blast_env.site.files import (
     save_scenario,
     scenario_hash,
 )
+from blast_env.site.heights import highest_top_m
 from blast_env.site.models import Scenario
-from blast_env.site.objective import ObjectiveSection
-from blast_env.site.sections import GaugeSection, SimulationSection
+from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, ObjectiveSection, WorstRisk
+from blast_env.site.parameters import (
+    ExplosiveParameters,
+    SimulationParameters,
+    for_charge,
+    parameters_digest,
+    preset,
+    with_overrides,
+    with_resolution,
+)
+from blast_env.site.presets import NamedMass, tnt_equivalent_kg
+from blast_env.site.sections import (
+    DrawingGeoreference,
+    GaugeSection,
+    MapGeoreference,
+    SimulationSection,
+)
+from blast_env.site.sight import in_sight
 from blast_env.site.sources import (
     AnyCharge,
     AnySource,
+    ChargeSource,
     PointSource,
     RectangleSource,
     SegmentSource,
     VehicleCharge,
     VehicleSource,
+    ranked,
 )
-from blast_env.site.structures import AnyStructure, ConcreteSquareSection, ModularObstacleSection
-from blast_env.site.zone import BuildZone, CostArea, KeepOut
+from blast_env.site.structures import (
+    AnyStructure,
+    ConcreteSquareSection,
+    ModularObstacleSection,
+    PolygonSection,
+    loaded_walls,
+)
+from blast_env.site.zone import BuildZone, CostArea, KeepOut, distance_m, source_bounds_m
 from blast_env.vehicles.access_way import AccessWay
 
 __all__ = [
+    "OUTWARDS",
     "SCHEMA_VERSION",
+    "WALLS",
     "AccessWay",
     "AnyCharge",
     "AnyScenario",
     "AnySource",
     "AnyStructure",
+    "BlastSite",
     "BuildZone",
     "Catalogue",
     "Cell",
     "Charge",
+    "ChargeSource",
     "ConcreteSquareSection",
+    "ConditionalValueAtRisk",
     "CostArea",
+    "DrawingGeoreference",
     "Element",
+    "ExplosiveParameters",
+    "Gauge",
     "GaugeSection",
+    "Hardening",
     "Item",
     "KeepOut",
     "Layout",
+    "MapGeoreference",
+    "MeanRisk",
     "ModularObstacleSection",
+    "NamedMass",
     "ObjectiveSection",
     "Piece",
     "PlacedModule",
     "PointSource",
+    "PolygonSection",
     "Problem",
     "RectangleSource",
     "Scenario",
     "ScenarioError",
     "SegmentSource",
+    "SimulationParameters",
     "SimulationSection",
     "Site",
     "StockBarrier",
+    "StructureOutline",
     "VehicleCharge",
     "VehicleSource",
+    "WorstRisk",
     "bundled_scenarios",
+    "distance_m",
     "find_problems",
     "find_scenario",
+    "for_charge",
+    "highest_top_m",
+    "in_sight",
     "load_scenario",
+    "loaded_walls",
+    "parameters_digest",
     "parse_scenario",
+    "preset",
+    "ranked",
     "save_scenario",
     "scenario_hash",
+    "source_bounds_m",
     "stock_barriers",
+    "tnt_equivalent_kg",
+    "with_overrides",
+    "with_resolution",
 ]

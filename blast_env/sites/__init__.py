@@ -2,37 +2,40 @@
 
 from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.sites.criterion import (
+    TARGETS,
     Objection,
     SiteCriterion,
     SiteMeasures,
     Visibility,
     VisibilityCriterion,
+    cut_share_of,
     visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
 from blast_env.sites.item_sites import (
     CLOSE_SIDES_M,
+    ITEM_KINDS,
+    POST,
     ItemSiteRanges,
     close_ranges,
     large_ranges,
 )
 from blast_env.sites.module_sites import SiteRanges
-from blast_env.sites.ranges import Ranges
-from blast_env.sites.source import (
-    FAMILIES,
-    HELD_OUT_SITES,
-    SiteSource,
-    training_sites,
-)
+from blast_env.sites.ranges import Draws, Ranges, SpacedObstacle, draw_place
+from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
 from blast_env.sites.turning import turned
 
 __all__ = [
     "CLOSE_SIDES_M",
     "FAMILIES",
     "HELD_OUT_SITES",
+    "ITEM_KINDS",
     "ITEM_SITES",
     "LARGE_SITES",
+    "POST",
     "SITES",
+    "TARGETS",
+    "Draws",
     "ItemSiteRanges",
     "Objection",
     "Ranges",
@@ -40,9 +43,12 @@ __all__ = [
     "SiteMeasures",
     "SiteRanges",
     "SiteSource",
+    "SpacedObstacle",
     "Visibility",
     "VisibilityCriterion",
     "close_ranges",
+    "cut_share_of",
+    "draw_place",
     "draw_site",
     "generate_site",
     "large_ranges",

@@ -1,15 +1,65 @@
 """A surrogate of gas dynamics, which predicts the loads of a blast within a millisecond."""
 
+from blast_env.surrogate.correction import Correction, apart_m3, stacked
 from blast_env.surrogate.engine import SurrogateEngine
-from blast_env.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_env.surrogate.walls import SurrogateSite, site_of
+from blast_env.surrogate.fitting import (
+    MEMBERS,
+    Predictions,
+    Samples,
+    errors,
+    fit,
+    folds,
+    load_errors,
+)
+from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor
+from blast_env.surrogate.network import (
+    SHAPES,
+    Check,
+    Fit,
+    Guess,
+    Member,
+    Networks,
+    Surrogate,
+    load_surrogate,
+    packaged_surrogate,
+)
+from blast_env.surrogate.relations import relations
+from blast_env.surrogate.walls import FEATURES, INPUTS, SurrogateSite, WallPoints, site_of
+from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 
 __all__ = [
+    "ABOVE_M",
+    "COVERAGE",
+    "FALLS_M",
+    "FEATURES",
+    "INPUTS",
+    "MEMBERS",
+    "SHAPES",
+    "SHARES",
+    "STATIONS",
+    "Check",
+    "Correction",
+    "Fit",
     "Guess",
+    "Member",
+    "Networks",
+    "Predictions",
+    "Samples",
     "Surrogate",
     "SurrogateEngine",
     "SurrogateSite",
+    "WallPoints",
+    "Ways",
+    "apart_m3",
+    "covered",
+    "errors",
+    "fit",
+    "folds",
+    "interval_factor",
+    "load_errors",
     "load_surrogate",
     "packaged_surrogate",
+    "relations",
     "site_of",
+    "stacked",
 ]

@@ -1,21 +1,17 @@
 """Vehicles with a charge: reach, speeds, worst places, crash ratings, and the access way."""
 
-from blast_env.vehicles.access_way import AccessWay
+from blast_env.vehicles.access_way import AccessWay, closing_places, is_open
 from blast_env.vehicles.crash_rating import CrashRating
-from blast_env.vehicles.drive import (
-    NOTHING,
-    Drive,
-    Impact,
-    Obstacles,
-    RatedPiece,
-    VehicleGround,
-)
+from blast_env.vehicles.drive import NOTHING, Drive, Impact, Obstacles, RatedPiece, VehicleGround
+from blast_env.vehicles.driving import KM_H_PER_M_S, STEP_M, SpeedField
 from blast_env.vehicles.reach import Reach
 from blast_env.vehicles.vehicle import Entry, Motion, SlowArea, Vehicle
 from blast_env.vehicles.worst_places import Wall, WorstPlaces, nearest_point_m, stand_off_m
 
 __all__ = [
+    "KM_H_PER_M_S",
     "NOTHING",
+    "STEP_M",
     "AccessWay",
     "CrashRating",
     "Drive",
@@ -26,10 +22,13 @@ __all__ = [
     "RatedPiece",
     "Reach",
     "SlowArea",
+    "SpeedField",
     "Vehicle",
     "VehicleGround",
     "Wall",
     "WorstPlaces",
+    "closing_places",
+    "is_open",
     "nearest_point_m",
     "stand_off_m",
 ]

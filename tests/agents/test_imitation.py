@@ -26,14 +26,13 @@ from blast_agents.training.imitation import (
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, settings_from
 from blast_agents.training.weights import read_parameters
 
-from blast_env.design.search.registry import layouts_by_rule
+from blast_env.design.search import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCaseSet
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
-from blast_env.site import Scenario, VehicleCharge, save_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario, VehicleCharge, save_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.catalogue_sites import wide_yard
 from tests.vehicle_sites import gate_site

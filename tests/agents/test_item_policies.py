@@ -13,8 +13,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.planes import GridObservation
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
-from blast_env.site import save_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, save_scenario
 from tests.agents.training_runs import hyperparameters, settings
 from tests.catalogue_sites import ITEMS, yard
 from tests.design.search_cases import CALIBRATION

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.rules import (
+from blast_env.design import (
     line_of_sight_wall,
     random_layout,
     ring_around_building,
@@ -16,19 +16,24 @@ from blast_env.design.rules import (
 from blast_env.design.search import (
     DesignProblem,
     Layout,
+    Moves,
     ProposerKind,
+    cut,
     find_proposer,
+    individual,
+    layout_of,
     layouts_by_rule,
+    mixed,
     proposers,
+    random_part,
+    random_walls,
+    repaired,
 )
-from blast_env.design.search.moves import Moves, random_part, random_walls
-from blast_env.design.search.operators import cut, individual, layout_of, mixed, repaired
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario
 from tests.agents.sites import site
 from tests.catalogue_sites import ITEMS, item, yard
 from tests.design.search_cases import CALIBRATION

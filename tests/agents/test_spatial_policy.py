@@ -23,8 +23,7 @@ from blast_env.envs.observable import Observable
 from blast_env.envs.planes import GridObservation
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
-from blast_env.sites import Visibility, generate_site
-from blast_env.sites.turning import turned
+from blast_env.sites import Visibility, generate_site, turned
 from tests.builders import block, point, site, zone
 
 LENGTH_M = 10.0  # what the features of length are divided by

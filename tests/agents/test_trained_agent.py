@@ -21,8 +21,7 @@ from blast_env.envs.observable import Observable
 from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.layout import LayoutState
-from blast_env.site import PointSource, Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, PointSource, Scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)

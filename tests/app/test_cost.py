@@ -12,7 +12,7 @@ from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.gas.cost import CostGuess, cost_words, time_words
+from blast_env.gas import CostGuess, cost_words, time_words
 from blast_env.report import StudyOptions
 from blast_env.report.cost import ReportCost
 from blast_env.site import load_scenario

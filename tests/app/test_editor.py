@@ -17,7 +17,7 @@ from blast_env.app.solids import boxes
 from blast_env.app.sources import blank_site
 from blast_env.app.threats import threats_of
 from blast_env.geometry import Piece
-from blast_env.plots.plan import STRUCTURE
+from blast_env.plots import STRUCTURE
 from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
 from tests.vehicle_sites import POSTS, gate_site

@@ -17,7 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import assessment
 from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.probability import level_probability
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response import LevelOfProtection
 from blast_env.site import Scenario
 from tests.app.test_page import opened, play
 from tests.app.test_work import session_on

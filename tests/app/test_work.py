@@ -36,9 +36,8 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.report import StudyOptions
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.site import Scenario, load_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.response import LevelOfProtection
+from blast_env.site import Charge, Scenario, load_scenario
 from tests.app.here import Here, rows_of
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.vehicle_sites import gate_site, vehicle_document

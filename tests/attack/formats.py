@@ -34,10 +34,9 @@ from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile, write_layout
 from blast_env.parquet import _run_record, checked_table, write_table
-from blast_env.particles.calibration.model import load_calibration, save_calibration
-from blast_env.particles.tables import COLLISION_COLUMNS
-from blast_env.site import Scenario, load_scenario, save_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.particles import COLLISION_COLUMNS
+from blast_env.particles.calibration import load_calibration, save_calibration
+from blast_env.site import Charge, Scenario, load_scenario, save_scenario
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.io.importing.maps import BLOCK, LAYERS
 from tests.site.documents import full_document

@@ -34,10 +34,9 @@ from blast_env.files import is_temporary
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.layout import write_layout
 from blast_env.parquet import write_table
-from blast_env.particles.calibration.model import load_calibration, save_calibration
-from blast_env.particles.tables import COLLISION_COLUMNS
-from blast_env.plots.figures import save_figure
-from blast_env.plots.film import write_film
+from blast_env.particles import COLLISION_COLUMNS
+from blast_env.particles.calibration import load_calibration, save_calibration
+from blast_env.plots import save_figure, write_film
 from blast_env.report.page import write_report
 from blast_env.site import save_scenario
 from blast_env.tables import write_csv

@@ -32,9 +32,8 @@ from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
 from blast_env.parquet import checked_table, write_table
-from blast_env.particles.tables import COLLISION_COLUMNS
-from blast_env.response.components import find_component
-from blast_env.response.facade import respond
+from blast_env.particles import COLLISION_COLUMNS
+from blast_env.response import find_component, respond
 from blast_env.site import Scenario, ScenarioError, save_scenario
 from blast_env.store import Store
 from blast_env.tables import markdown_table

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
-from blast_env.design.search import DesignProblem
-from blast_env.design.search.advice import (
+from blast_env.design.search import (
+    DesignProblem,
     MeasureKind,
     advise,
     advise_until,
@@ -25,8 +25,8 @@ from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import LayoutState, load_layout
-from blast_env.plots.cost_level import PricedDamage, cheapest
-from blast_env.site.blast_site import Charge
+from blast_env.plots import PricedDamage, cheapest
+from blast_env.site import Charge
 from tests.evaluation.test_response_objective import THREAT
 from tests.site.test_hardening import glazed_yard
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.cli.options import wanted_level
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response import LevelOfProtection
 from blast_env.site import Scenario
 from tests.gas_sites import WALL, glazed_hut
 

@@ -12,8 +12,7 @@ from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.probability import scaled_to
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
-from blast_env.site import AnyCharge
-from blast_env.site.blast_site import Charge
+from blast_env.site import AnyCharge, Charge
 from tests.gas_sites import WALL, glazed_hut
 
 

@@ -12,7 +12,7 @@ from typer.testing import Result
 
 import blast_env
 from blast_env import load_scenario, save_scenario, simulate, write_layout
-from blast_env.particles.calibration.model import load_calibration
+from blast_env.particles.calibration import load_calibration
 from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.plots import film
 from blast_env.store import Store

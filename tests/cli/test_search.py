@@ -10,14 +10,12 @@ from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
-from blast_env.design.search import DesignProblem, find_proposer
-from blast_env.design.search.learnt import search_by
+from blast_env.design.search import DesignProblem, find_proposer, search_by
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
-from blast_env.particles.event.engine import EventRun
-from blast_env.site import SegmentSource
-from blast_env.site.blast_site import Charge
+from blast_env.particles.event import EventRun
+from blast_env.site import Charge, SegmentSource
 from blast_env.surrogate import packaged_surrogate
 from tests.catalogue_sites import wide_yard
 from tests.design.search_cases import small_scenario

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from blast_env.design.rules import random_layout
+from blast_env.design import random_layout
 from blast_env.design.search import Search, SearchSession
 
 

@@ -15,8 +15,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_layout,
 )
-from blast_env.site import PointSource, Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, PointSource, Scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario
 

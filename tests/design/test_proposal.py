@@ -20,8 +20,7 @@ from blast_env.design.search import layouts_by_rule
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece, Removal
 from blast_env.layout import load_layout
-from blast_env.site import Scenario, save_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario, save_scenario
 from tests.catalogue_sites import wide_yard
 
 CHARGE = Charge((1.7, 5.2), 5.0)

@@ -12,17 +12,17 @@ from blast_env.app import offers
 from blast_env.benchmark import JudgedSubmission, make, play
 from blast_env.benchmark.methods import find_method
 from blast_env.cli import app
-from blast_env.design.rules import random_layout
+from blast_env.design import random_layout
 from blast_env.design.search import (
     DesignProblem,
+    LearntSearch,
     ProposerKind,
+    ProposerRow,
     Report,
     SearchResult,
     layouts_by_rule,
     registry,
 )
-from blast_env.design.search.learnt import LearntSearch
-from blast_env.design.search.registry import ProposerRow
 from blast_env.errors import BlastEnvError
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine

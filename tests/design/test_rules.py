@@ -9,12 +9,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.bollards import line_of_posts, posts_and_wall
-from blast_env.design.rules import (
+from blast_env.design import (
     NEAR_BUILDING,
     NEAR_CHARGE,
     expected_charge,
+    line_of_posts,
     line_of_sight_wall,
+    posts_and_wall,
     random_layout,
     wall_near_building,
     wall_near_charge,
@@ -22,10 +23,8 @@ from blast_env.design.rules import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import worst_places
-from blast_env.site import PointSource, RectangleSource, Scenario, load_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.layout import LayoutState, worst_places
+from blast_env.site import Charge, PointSource, RectangleSource, Scenario, load_scenario
 from tests.agents.sites import site
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
 

@@ -8,17 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env import load_scenario
-from blast_env.design.rules import random_layout
-from blast_env.design.search import Layout
-from blast_env.design.search.moves import Moves, random_walls
-from blast_env.design.search.operators import cut, repaired
-from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
+from blast_env.design import random_layout
+from blast_env.design.search import (
+    Layout,
+    Moves,
+    Plan,
+    SearchEndedError,
+    SearchSession,
+    cut,
+    random_walls,
+    repaired,
+)
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
-from blast_env.site.blast_site import Charge
-from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk
+from blast_env.site import Charge, ConditionalValueAtRisk, MeanRisk
 from tests.agents.sites import site
 from tests.design.search_cases import ballistic, small_problem, small_scenario
 

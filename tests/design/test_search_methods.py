@@ -6,25 +6,24 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from blast_env.design.rules import wall_near_charge
+from blast_env.design import wall_near_charge
 from blast_env.design.search import (
     DesignProblem,
     GeneticSearch,
     Layout,
+    LearntSearch,
+    PopulationAnnealingSearch,
     ProposerKind,
     SearchResult,
     find_proposer,
     layouts_by_rule,
     proposers,
 )
-from blast_env.design.search.learnt import LearntSearch
-from blast_env.design.search.methods import PopulationAnnealingSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
-from blast_env.site import AnyCharge, Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import AnyCharge, Charge, Scenario
 from tests.design.search_cases import (
     WatchedEvaluator,
     ballistic,

@@ -10,9 +10,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
-from blast_env.particles.balls import Balls, CollisionType
-from blast_env.particles.run import BlastRun
-from blast_env.particles.scene import Scene
+from blast_env.particles import Balls, BlastRun, CollisionType, Scene
 from blast_env.site import Scenario, load_scenario
 from tests import builders
 from tests.builders import block, point, site_document, square

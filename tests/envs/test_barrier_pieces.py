@@ -14,8 +14,7 @@ from blast_env.envs.planes import EMPTY_REACH, REACH, GridObservation
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import charge_against, vehicle_reach, worst_places
+from blast_env.layout import LayoutState, charge_against, vehicle_reach, worst_places
 from blast_env.site import VehicleCharge
 from tests.catalogue_sites import ITEMS, WALL, item, yard
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of

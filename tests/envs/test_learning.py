@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation.engines import BlastLoads, StructureLoad
 from blast_env.geometry import Element
-from blast_env.layout.build_site import charge_against
+from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Scenario
 from tests.envs.small import small_document
 from tests.evaluation.engines.shade import ShadeEngine

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
-from blast_env.surrogate.engine import SurrogateEngine
+from blast_env.surrogate import SurrogateEngine
 from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
 from tests.envs.test_barrier_env import CountOfModules
 from tests.evaluation.engines.shade import ShadeEngine

@@ -10,8 +10,8 @@ from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.probability import scaled_to
 from blast_env.evaluation.shared import consequences
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.site.blast_site import Charge
+from blast_env.response import LevelOfProtection
+from blast_env.site import Charge
 from tests.gas_sites import glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 0.1)

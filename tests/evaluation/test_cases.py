@@ -11,8 +11,7 @@ from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, search_set
-from blast_env.site import PointSource, Scenario
-from blast_env.site.objective import ConditionalValueAtRisk
+from blast_env.site import ConditionalValueAtRisk, PointSource, Scenario
 from tests.evaluation.cases import COURTYARD, SEEDS
 
 

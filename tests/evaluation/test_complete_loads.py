@@ -8,7 +8,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.shared import consequences
 from blast_env.evaluation.standing import NOT_KNOWN
 from blast_env.report.loads import measure, targets_of
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge
 from tests.gas_sites import glazed_hut, hut
 
 CUT, WHOLE = GasEngine(border_m=0.0, until=0.012), GasEngine(border_m=0.0, until="walls")

@@ -19,10 +19,14 @@ from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
-from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.response.facade import peak_corrected, peak_factor, respond
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.response import (
+    BuildingDamage,
+    LevelOfProtection,
+    peak_corrected,
+    peak_factor,
+    respond,
+)
+from blast_env.site import Charge, Scenario
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 
 FACADE = {"storey_m": 2.5, "bay_m": 1.5, "glazing": "window_laminated_6", "wall": "concrete_200"}

@@ -3,8 +3,8 @@
 import numpy as np
 
 from blast_env.evaluation.consequences import BuildingResponse, Severity
-from blast_env.response.facade import respond
-from blast_env.site.blast_site import Charge
+from blast_env.response import respond
+from blast_env.site import Charge
 from tests.gas_sites import glazed_hut
 
 

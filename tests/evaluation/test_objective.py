@@ -15,9 +15,15 @@ from blast_env.evaluation import (
     LoadCaseSet,
     draw_threats,
 )
-from blast_env.site import ObjectiveSection, Scenario, ScenarioError
-from blast_env.site.blast_site import Charge
-from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, WorstRisk
+from blast_env.site import (
+    Charge,
+    ConditionalValueAtRisk,
+    MeanRisk,
+    ObjectiveSection,
+    Scenario,
+    ScenarioError,
+    WorstRisk,
+)
 from blast_env.units import PA_PER_PSI
 from tests.evaluation.cases import evaluate_against
 from tests.gas_sites import WALL, hut, site_document

@@ -13,10 +13,9 @@ import pytest
 from blast_env.app.records import BlastedLayout, BlastRecord, comparison
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.gas.oblique_walls import stepped_buildings
+from blast_env.gas import stepped_buildings
 from blast_env.report.loads import measure, targets_of
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario
 from tests.app.here import rows_of
 from tests.gas_sites import site_document
 

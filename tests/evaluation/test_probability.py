@@ -17,9 +17,8 @@ from blast_env.evaluation.probability import (
     scaled_to,
 )
 from blast_env.evaluation.shared import consequences
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.sdof import impulses
-from blast_env.site.blast_site import Charge
+from blast_env.response import LevelOfProtection, impulses
+from blast_env.site import Charge
 from tests.gas_sites import WALL, glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 0.1)

@@ -14,10 +14,9 @@ from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
 from blast_env.layout import LayoutState
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import peak_corrected, peak_factor, respond
-from blast_env.site.blast_site import Charge
-from blast_env.surrogate.engine import SurrogateEngine
+from blast_env.response import LevelOfProtection, peak_corrected, peak_factor, respond
+from blast_env.site import Charge
+from blast_env.surrogate import SurrogateEngine
 from tests.catalogue_sites import WALL
 from tests.evaluation.cases import evaluate_against
 from tests.site.test_hardening import TAKEN, glazed_yard

@@ -6,14 +6,19 @@ import pytest
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.screening import Screening, screen, stand_offs
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Glazing, catalogue
-from blast_env.response.damage import damage_number, level_of, under_triangle
-from blast_env.response.facade import Bay, FilledBay, respond
-from blast_env.response.requirements import Requirement
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
-from blast_env.site.presets import NamedMass, tnt_equivalent_kg
+from blast_env.response import (
+    Bay,
+    FilledBay,
+    Glazing,
+    LevelOfProtection,
+    Requirement,
+    catalogue,
+    damage_number,
+    level_of,
+    respond,
+    under_triangle,
+)
+from blast_env.site import Charge, NamedMass, Scenario, tnt_equivalent_kg
 from tests.gas_sites import hut, site_document
 
 

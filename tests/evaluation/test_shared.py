@@ -10,8 +10,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import Consequences, bay_table
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario
 from tests.report.sites import LAYOUT, glazed_hut
 from tests.site.test_hardening import TAKEN, glazed_yard
 

@@ -8,7 +8,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.shared import consequences
 from blast_env.evaluation.standing import LoadStanding, standing_of
 from blast_env.geometry import Layout
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 
 

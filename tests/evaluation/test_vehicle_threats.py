@@ -16,9 +16,8 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import search_set
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.layout.build_site import build_site, charge_against, worst_places
-from blast_env.site import VehicleCharge
-from blast_env.site.blast_site import Charge
+from blast_env.layout import build_site, charge_against, worst_places
+from blast_env.site import Charge, VehicleCharge
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 
 SITE = gate_site(vehicle_document(places=2), calibration="ballistic_kb_100kg")

@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blast_env.gas.faces import Faces, exposed_faces
-from blast_env.gas.grid import FaceKind, GasGrid
-from blast_env.gas.probes import FaceLoads
-from blast_env.gas.solver import GasSolver
+from blast_env.gas import FaceKind, FaceLoads, Faces, GasGrid, GasSolver, exposed_faces
 
 CLOSED: dict[str, Any] = dict.fromkeys(
     ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high"), FaceKind.MIRROR

@@ -6,13 +6,23 @@ import numpy as np
 import pytest
 
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.gas.coarsening import CoarseningSolver, shape_to_double, with_double_cells
-from blast_env.gas.faces import exposed_faces
-from blast_env.gas.grid import FaceKind, GasGrid
-from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
-from blast_env.gas.settings import CELLS
-from blast_env.gas.solver import Gas, GasSolver, Settling
-from blast_env.gas.source import GasCharge, set_charge
+from blast_env.gas import (
+    CELLS,
+    CoarseningSolver,
+    FaceKind,
+    FaceLoads,
+    Gas,
+    GasCharge,
+    GasGrid,
+    GasSolver,
+    Gauges,
+    GroundMap,
+    Settling,
+    exposed_faces,
+    set_charge,
+    shape_to_double,
+    with_double_cells,
+)
 from studies.bench import street
 
 CELL_M = 0.5

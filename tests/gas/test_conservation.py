@@ -5,10 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.gas.faces import ground_faces
-from blast_env.gas.grid import FaceKind
-from blast_env.gas.probes import FaceLoads
-from blast_env.gas.solver import Burning, Settling
+from blast_env.gas import Burning, FaceKind, FaceLoads, Settling, ground_faces
 from blast_env.gas.state import ENERGY
 from tests.gas.flows import CLOSED, blast, face_loads, recorder, street
 

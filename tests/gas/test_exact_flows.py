@@ -5,9 +5,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from blast_env.gas.faces import exposed_faces, ground_faces
-from blast_env.gas.grid import FaceKind, GasGrid
-from blast_env.gas.solver import GasSolver
+from blast_env.gas import FaceKind, GasGrid, GasSolver, exposed_faces, ground_faces
 from tests.gas.exact import (
     GAMMA,
     State,

@@ -11,18 +11,22 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
-from blast_env.gas.faces import exposed_faces, ground_faces
-from blast_env.gas.grid import FaceKind, GasGrid
-from blast_env.gas.probes import (
+from blast_env.gas import (
+    Burning,
+    FaceKind,
     FaceLoads,
+    GasGrid,
+    GasSolver,
     Gauges,
     GroundMap,
     LoadTable,
     PatchHistories,
+    Settling,
     Snapshots,
+    exposed_faces,
+    ground_faces,
     positive_phases,
 )
-from blast_env.gas.solver import Burning, GasSolver, Settling
 from tests.gas.flows import all_faces, blast, face_loads, recorder, street
 
 STEP_S = 1e-3

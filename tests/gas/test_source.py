@@ -7,12 +7,12 @@ import pytest
 
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
-from blast_env.gas.grid import GasGrid
-from blast_env.gas.solver import GasSolver
-from blast_env.gas.source import (
+from blast_env.gas import (
     LEAST_RADIUS_CELLS,
     TNT,
     GasCharge,
+    GasGrid,
+    GasSolver,
     RadialProfile,
     clearance_m,
     largest_radius_m,

@@ -8,15 +8,22 @@ import pytest
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.gas.engine import GasRun
-from blast_env.gas.grid import GasGrid
-from blast_env.gas.probes import Gauges
-from blast_env.gas.solver import AIR_DENSITY_KG_M3, GasSolver
-from blast_env.gas.source import TNT, GasCharge, largest_radius_m, set_charge
-from blast_env.gas.spherical import DENSITY, ENERGY, PRODUCTS, SphericalBlast
+from blast_env.gas import (
+    AIR_DENSITY_KG_M3,
+    TNT,
+    GasCharge,
+    GasGrid,
+    GasRun,
+    GasSolver,
+    Gauges,
+    SphericalBlast,
+    largest_radius_m,
+    set_charge,
+)
+from blast_env.gas.spherical import DENSITY, ENERGY, PRODUCTS
 from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.geometry import Rectangle
-from blast_env.site.blast_site import BlastSite, Charge, Gauge
+from blast_env.site import BlastSite, Charge, Gauge
 
 Z = np.array([1.7, 2.2, 2.7, 3.5, 4.3, 5.4])
 

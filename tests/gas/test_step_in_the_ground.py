@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blast_env.gas.engine import GasRun
-from blast_env.gas.probes import FaceLoads
-from blast_env.gas.settings import GasSettings
-from blast_env.layout.build_site import build_site
+from blast_env.gas import FaceLoads, GasRun, GasSettings
+from blast_env.layout import build_site
 from tests import builders
 from tests.builders import block, point
 from tests.gas.flows import all_faces, blast, check_nothing_is_lost, face_loads, recorder

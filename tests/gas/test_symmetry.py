@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blast_env.gas import kernels
+from blast_env.gas import FaceLoads, exposed_faces, kernels
 from blast_env.gas import solver as solver_module
-from blast_env.gas.faces import exposed_faces
-from blast_env.gas.probes import FaceLoads
 from tests.gas.flows import blast, face_loads, recorder, street
 
 Turn = Callable[[NDArray[Any]], NDArray[Any]]

@@ -8,12 +8,9 @@ from numpy.typing import ArrayLike
 from blast_env.evaluation.engines import ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
-from blast_env.particles.balls import Balls, CollisionType
+from blast_env.particles import Balls, BallStates, BlastRun, CollisionType, Scene
 from blast_env.particles.pymunk.engine import PymunkRun
-from blast_env.particles.run import BallStates, BlastRun
-from blast_env.particles.scene import Scene
-from blast_env.site.blast_site import Charge, StructureOutline
-from blast_env.site.parameters import SimulationParameters, with_overrides
+from blast_env.site import Charge, SimulationParameters, StructureOutline, with_overrides
 from blast_env.units import UNITS_PER_M
 
 EXPLOSIVE, AIR = CollisionType.ExplosionBall, CollisionType.AirBall

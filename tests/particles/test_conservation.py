@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.evaluation.engines import ParticleEngine
 from blast_env.evaluation.engines.particles import PymunkEngine
-from blast_env.site.parameters import SimulationParameters
+from blast_env.site import SimulationParameters
 from tests.particles.scenes import (
     AIR,
     EVENT,

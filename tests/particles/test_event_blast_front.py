@@ -22,11 +22,8 @@ from scipy.ndimage import gaussian_filter1d
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
-from blast_env.particles.balls import Balls, air_lattice, explosion_fan
-from blast_env.particles.run import BallStates
-from blast_env.particles.scene import Scene
-from blast_env.site.blast_site import Charge, StructureOutline
-from blast_env.site.parameters import SimulationParameters, with_overrides
+from blast_env.particles import Balls, BallStates, Scene, air_lattice, explosion_fan
+from blast_env.site import Charge, SimulationParameters, StructureOutline, with_overrides
 from blast_env.units import UNITS_PER_M
 
 SPACING_UNITS: Final = 10.0

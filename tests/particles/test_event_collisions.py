@@ -8,12 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
-from blast_env.particles.balls import Balls
+from blast_env.particles import Balls, Scene
 from blast_env.particles.event import engine as event_engine
-from blast_env.particles.scene import Scene
 from blast_env.results import EndReason
-from blast_env.site.blast_site import StructureOutline
-from blast_env.site.parameters import SimulationParameters
+from blast_env.site import SimulationParameters, StructureOutline
 from tests.particles.scenes import (
     AIR,
     EVENT,

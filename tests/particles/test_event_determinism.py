@@ -15,11 +15,16 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine, PymunkEngine
 from blast_env.geometry import Rectangle
-from blast_env.particles.balls import Balls, air_lattice, explosion_fan
-from blast_env.particles.event.engine import EventRun
-from blast_env.particles.run import BlastRun
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import ModularObstacle, obstacle_of
+from blast_env.particles import (
+    Balls,
+    BlastRun,
+    ModularObstacle,
+    Scene,
+    air_lattice,
+    explosion_fan,
+    obstacle_of,
+)
+from blast_env.particles.event import EventRun
 from blast_env.units import MODULE_SIDE_UNITS
 from tests.builders import point, site, square
 from tests.particles.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall

@@ -9,13 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
-from blast_env.particles.balls import Balls, distance_to_rectangle
-from blast_env.particles.run import BallStates
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import obstacle_of
+from blast_env.particles import Balls, BallStates, Scene, distance_to_rectangle, obstacle_of
 from blast_env.results import EndReason
-from blast_env.site.blast_site import StructureOutline
-from blast_env.site.parameters import SimulationParameters
+from blast_env.site import SimulationParameters, StructureOutline
 from tests.particles.scenes import (
     AIR,
     EVENT,

@@ -14,17 +14,18 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult, simulate
 from blast_env.parquet import METADATA_KEY, read_parquet, write_table
-from blast_env.particles.balls import CollisionType
-from blast_env.particles.recording import write_blast
-from blast_env.particles.run import COLLISION_DTYPE, CollisionArray
-from blast_env.particles.structure import ModularObstacle
-from blast_env.particles.tables import (
+from blast_env.particles import (
     COLLISION_COLUMNS,
+    COLLISION_DTYPE,
     MODULE_COLUMNS,
     STRUCTURE_COLUMNS,
+    CollisionArray,
+    CollisionType,
+    ModularObstacle,
     collision_table,
     module_table,
     structure_table,
+    write_blast,
 )
 from blast_env.site import (
     Scenario,

@@ -6,11 +6,9 @@ import pytest
 from blast_env import simulate
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine
 from blast_env.evaluation.engines.particles import PymunkEngine
-from blast_env.particles.balls import CollisionType
-from blast_env.particles.run import COLLISION_DTYPE, incidence_angle_rad
-from blast_env.particles.scene import Scene
+from blast_env.particles import COLLISION_DTYPE, CollisionType, Scene, incidence_angle_rad
 from blast_env.results import EndReason
-from blast_env.site.parameters import SimulationParameters
+from blast_env.site import SimulationParameters
 from tests.particles.scenes import (
     AIR,
     EVENT,

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine, simulate
 from blast_env.evaluation.engines.particles import PymunkEngine, find_particle_engine
 from blast_env.geometry import Rectangle
-from blast_env.particles.balls import CollisionType, air_lattice, explosion_fan
-from blast_env.particles.scene import Scene
+from blast_env.particles import CollisionType, Scene, air_lattice, explosion_fan
 from blast_env.results import EndReason
 from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M

@@ -7,20 +7,19 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.layout.build_site import build_site
-from blast_env.particles.balls import Balls, explosion_fan
-from blast_env.particles.scene import build_scene
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
-from blast_env.site.parameters import (
+from blast_env.layout import build_site
+from blast_env.particles import Balls, build_scene, explosion_fan
+from blast_env.site import (
+    Charge,
     ExplosiveParameters,
+    Scenario,
     SimulationParameters,
     for_charge,
     preset,
+    source_bounds_m,
     with_overrides,
     with_resolution,
 )
-from blast_env.site.zone import source_bounds_m
 
 KEPT = ExplosiveParameters(ball_count=20_000)
 

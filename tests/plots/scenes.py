@@ -1,8 +1,7 @@
 import numpy as np
 
 from blast_env.evaluation.engines import Blast
-from blast_env.particles.run import BallStates
-from blast_env.particles.scene import Scene
+from blast_env.particles import BallStates, Scene
 from blast_env.site import Scenario
 from tests.builders import block, point, site, square, zone
 

@@ -10,14 +10,24 @@ from matplotlib.patches import Circle, Rectangle
 from blast_env.calibration import kingery_bulmash
 from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.plots.facade import LEVEL_COLOURS, facade_picture
-from blast_env.plots.ground_map import ground_recorders, open_distance_m, threshold_map
-from blast_env.plots.pressure_impulse import level_bounds, pressure_impulse_diagram
-from blast_env.response.buildings import LevelOfProtection, ground_thresholds
-from blast_env.response.components import Glazing, find_component
-from blast_env.response.facade import FacadeResponse, respond
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.plots import (
+    LEVEL_COLOURS,
+    facade_picture,
+    ground_recorders,
+    level_bounds,
+    open_distance_m,
+    pressure_impulse_diagram,
+    threshold_map,
+)
+from blast_env.response import (
+    FacadeResponse,
+    Glazing,
+    LevelOfProtection,
+    find_component,
+    ground_thresholds,
+    respond,
+)
+from blast_env.site import Charge, Scenario
 from tests.catalogue_sites import WALL, yard_document
 
 CHARGE = Charge((2.0, 6.0), 5.0)

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from blast_env import Charge, load_scenario
 from blast_env.evaluation import Evaluation, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.plots.evaluation_figures import evaluation_figure
-from blast_env.plots.figures import save_figure
+from blast_env.plots import evaluation_figure, save_figure
 from blast_env.site import Scenario
 from tests.gas_sites import WALL as WALL_OF_HUT
 from tests.gas_sites import hut

@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 from blast_env import simulate
 from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.particles.calibration.model import seen_width_m
-from blast_env.particles.tables import faces_hit
-from blast_env.plots.figures import heat_map, impulse_over_time
-from blast_env.plots.heat_map import LoadScale
-from blast_env.plots.style import nice_ceiling, short_number
+from blast_env.particles import faces_hit
+from blast_env.particles.calibration import seen_width_m
+from blast_env.plots import LoadScale, impulse_over_time, nice_ceiling, short_number
+from blast_env.plots.figures import heat_map
 from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
 from tests.design.search_cases import small_scenario

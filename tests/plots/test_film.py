@@ -13,10 +13,7 @@ from PIL import Image
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.plots.film import write_film
-from blast_env.plots.film_files import FilmPlan, plan_until
-from blast_env.plots.frames import FramePainter
-from blast_env.plots.style import shown_until_s
+from blast_env.plots import FilmPlan, FramePainter, plan_until, shown_until_s, write_film
 
 
 def test_an_mp4_has_the_planned_frames_and_even_sizes(blast: Blast, tmp_path: Path) -> None:

@@ -14,15 +14,20 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
-from blast_env.particles.balls import CollisionType
-from blast_env.particles.structure import load_colour
-from blast_env.plots.canvas import Frame
-from blast_env.plots.frames import FramePainter
-from blast_env.plots.heat_map import LoadScale
-from blast_env.plots.placing import PlacingPainter, sources_text
-from blast_env.plots.plan import BARRIER, EXPLOSIVE, FREE_CELL, PROTECTED
-from blast_env.plots.style import AIR
-from blast_env.plots.window import Window
+from blast_env.particles import CollisionType, load_colour
+from blast_env.plots import (
+    AIR,
+    BARRIER,
+    EXPLOSIVE,
+    FREE_CELL,
+    PROTECTED,
+    Frame,
+    FramePainter,
+    LoadScale,
+    PlacingPainter,
+    Window,
+    sources_text,
+)
 from blast_env.site import RectangleSource, SegmentSource
 from blast_env.units import UNITS_PER_M
 from tests.plots.scenes import LAYOUT, balls_at_start, small_scenario

@@ -16,18 +16,23 @@ from blast_env import Charge
 from blast_env.curves import kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.gas.probes import GroundMap
-from blast_env.plots.film import write_film
-from blast_env.plots.film_files import plan_until
-from blast_env.plots.gas import facades, full_load, gauge_history
-from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values
-from blast_env.plots.pressure_film import record_planes, scale_end_kpa
-from blast_env.plots.pressure_frames import (
+from blast_env.gas import GroundMap
+from blast_env.plots import (
     PressurePainter,
     PressureShot,
     VerticalSection,
     default_section,
+    facades,
+    full_load,
+    gauge_history,
+    ground_recorders,
+    ground_values,
+    plan_until,
+    record_planes,
+    scale_end_kpa,
+    write_film,
 )
+from blast_env.plots.ground_map import ground_map
 from blast_env.site import Scenario
 from tests.gas_sites import WALL, hut
 

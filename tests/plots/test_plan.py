@@ -19,26 +19,27 @@ import blast_env.plots.plan
 from blast_env.app.plan import PixelView, plan_svg
 from blast_env.cli import app
 from blast_env.geometry import Rectangle
-from blast_env.io.export import LayoutPlan
-from blast_env.io.export.dxf import drawing
-from blast_env.io.export.files import feature_collection
-from blast_env.layout import LayoutState, write_layout
-from blast_env.layout.build_site import build_site, vehicle_reach
-from blast_env.plots.labels import Label, labels_of, settled_labels
-from blast_env.plots.placing import PlacingPainter, sources_text
-from blast_env.plots.plan import (
+from blast_env.io.export import LayoutPlan, drawing, feature_collection
+from blast_env.layout import LayoutState, build_site, vehicle_reach, write_layout
+from blast_env.plots import (
     Feature,
     FeatureKind,
     Kinds,
+    Label,
     Look,
+    PlacingPainter,
     area_feature,
+    draw_outlines,
+    labels_of,
+    outline_path,
     rectangles_of,
+    settled_labels,
     site_features,
+    sources_text,
     stand_off_text,
     vehicle_features,
 )
 from blast_env.plots.site_picture import site_picture
-from blast_env.plots.site_plan import draw_outlines, outline_path
 from blast_env.site import BuildZone, Scenario, load_scenario, save_scenario
 from tests.catalogue_sites import WALL, yard, yard_document
 from tests.gas_sites import column

@@ -23,8 +23,7 @@ from blast_env.report.threats import (
     place_text,
     requested_threats,
 )
-from blast_env.site import Scenario, ScenarioError
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario, ScenarioError
 from tests.gas_sites import site_document
 from tests.report.sites import small_hut
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document

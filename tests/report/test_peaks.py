@@ -5,13 +5,13 @@ import pytest
 
 from blast_env.calibration import kingery_bulmash
 from blast_env.geometry import Layout
-from blast_env.layout.build_site import build_site
+from blast_env.layout import build_site
 from blast_env.report.outcomes import Limit
 from blast_env.report.page import report_html
 from blast_env.report.peaks import CountedPeak, PeakSource, counted_peak
 from blast_env.report.study import Study
 from blast_env.report.verdict import StudyVerdict
-from blast_env.response.facade import peak_factor
+from blast_env.response import peak_factor
 from tests.gas_sites import WALL, hut
 
 

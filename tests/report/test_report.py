@@ -20,9 +20,9 @@ from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.grid_error import convergence_index
 from blast_env.evaluation.shared import consequences
-from blast_env.gas.settings import Cells
+from blast_env.gas import Cells
 from blast_env.geometry import Layout, Measure, layout_text
-from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
+from blast_env.io.export import LayoutPlan, bill_of_quantities
 from blast_env.layout import write_layout
 from blast_env.report import Limit, Study, StudyOptions, run_study, write_report
 from blast_env.report.details import ReportDetails, read_details
@@ -31,11 +31,8 @@ from blast_env.report.page import report_html
 from blast_env.report.study import Runs, blasts_of
 from blast_env.report.threats import other_places
 from blast_env.report.verdict import StudyVerdict
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import catalogue
-from blast_env.site import Scenario, save_scenario
-from blast_env.site.blast_site import Charge
-from blast_env.site.catalogue import Hardening
+from blast_env.response import LevelOfProtection, catalogue
+from blast_env.site import Charge, Hardening, Scenario, save_scenario
 from tests.catalogue_sites import WALL, yard
 from tests.report.sites import LAYOUT, glazed_hut, small_hut
 from tests.site.test_hardening import TAKEN, glazed_yard

@@ -3,25 +3,26 @@
 import numpy as np
 import pytest
 
-from blast_env.response.buildings import (
-    BuildingDamage,
-    LevelOfProtection,
-    building_damage_probability,
-    eardrum_peak_pa,
-    eardrum_rupture_probability,
-    ground_thresholds,
-    level_of_protection,
-)
-from blast_env.response.components import Glazing, catalogue
-from blast_env.response.damage import (
+from blast_env.response import (
     Alternatives,
+    Bay,
+    BuildingDamage,
+    DamageLevel,
+    FilledBay,
+    Glazing,
+    LevelOfProtection,
     TriangularLoads,
     bay_damages,
+    building_damage_probability,
+    catalogue,
+    eardrum_peak_pa,
+    eardrum_rupture_probability,
     fails_from,
+    ground_thresholds,
     level_of,
+    level_of_protection,
+    respond,
 )
-from blast_env.response.facade import Bay, FilledBay, respond
-from blast_env.response.walls import DamageLevel
 
 BAY = Bay("office", "west", 1, 1, 0.0, 3.0, 0.0, 3.5)
 PEAKS_PA = np.geomspace(1e3, 200e3, 40)

@@ -7,19 +7,23 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Glazing, Wall, catalogue, find_component
-from blast_env.response.facade import (
+from blast_env.response import (
     Bay,
     FilledBay,
+    Glazing,
+    GlazingCondition,
+    Interlayer,
+    LevelOfProtection,
+    Wall,
     assumption_words,
+    catalogue,
     divide,
+    find_component,
     force_words,
+    panel_responses,
     peak_corrected,
     respond,
 )
-from blast_env.response.glass import GlazingCondition, Interlayer
-from blast_env.response.walls import panel_responses
 
 GROUND = Rectangle(10.0, 20.0, 22.0, 27.0)
 

@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.response.glass import (
+from blast_env.response import (
     GlassKind,
     GlazingCondition,
     Interlayer,
     Pane,
     flight_condition,
     glazing_responses,
+    plate_curve,
 )
-from blast_env.response.plate_table import plate_curve
 
 # Read by others from the charts of ASTM E1300, annealed, four sides held: least thickness (mm),
 # long and short side (m), non-factored load (kPa).

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from blast_env.errors import BlastEnvError
-from blast_env.response.sdof import Resistance, System, responses
+from blast_env.response import Resistance, System, responses
 
 STIFFNESS = 1e6
 MASS = 100.0

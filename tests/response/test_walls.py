@@ -10,23 +10,26 @@ from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.screening import stand_offs
-from blast_env.response.barriers import RigidPiece, Standing, piece_responses
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Wall, catalogue
-from blast_env.response.kernels import move_piece
-from blast_env.response.walls import (
+from blast_env.response import (
     CONCRETE_LIMITS,
     DamageLevel,
+    LevelOfProtection,
     Masonry,
     Panel,
     ReinforcedConcrete,
+    RigidPiece,
     Sheeting,
+    Standing,
     Supports,
+    Wall,
+    catalogue,
     damage_level,
     load_mass_factors,
     panel_responses,
+    piece_responses,
 )
-from blast_env.site.blast_site import Charge
+from blast_env.response.kernels import move_piece
+from blast_env.site import Charge
 
 STEEL = Sheeting(moment_n=3000.0, bending_stiffness_n_m=1.2e5, mass_kg_m2=45.0, material="steel")
 

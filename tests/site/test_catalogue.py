@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 from blast_env.errors import LayoutError
 from blast_env.evaluation.engines import simulate
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import LayoutFile, LayoutState, load_layout, write_layout
-from blast_env.layout.build_site import build_site
-from blast_env.particles.scene import build_scene
-from blast_env.particles.structure import obstacle_of
+from blast_env.layout import LayoutFile, LayoutState, build_site, load_layout, write_layout
+from blast_env.particles import build_scene, obstacle_of
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario, stock_barriers
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
 from tests.site.documents import Document

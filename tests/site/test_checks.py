@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
-from blast_env.site import PointSource, RectangleSource, SegmentSource
-from blast_env.site.zone import distance_m
+from blast_env.site import PointSource, RectangleSource, SegmentSource, distance_m
 from tests.site.documents import (
     KeyPath,
     changed,

@@ -5,11 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.layout import usable_cells
-from blast_env.layout.build_site import build_site, draw_charge
-from blast_env.particles.scene import build_scene
-from blast_env.site import Scenario, ScenarioError, bundled_scenarios, load_scenario
-from blast_env.site.blast_site import WALLS, Charge, Gauge
+from blast_env.layout import build_site, draw_charge, usable_cells
+from blast_env.particles import build_scene
+from blast_env.site import (
+    WALLS,
+    Charge,
+    Gauge,
+    Scenario,
+    ScenarioError,
+    bundled_scenarios,
+    load_scenario,
+)
 from tests.site.documents import (
     Document,
     KeyPath,

@@ -7,15 +7,15 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.layout import usable_cells
 from blast_env.site import (
+    Charge,
     PointSource,
     RectangleSource,
     Scenario,
     ScenarioError,
     SegmentSource,
     load_scenario,
+    preset,
 )
-from blast_env.site.blast_site import Charge
-from blast_env.site.parameters import preset
 from tests.site.documents import Document, changed, full_document, minimal_document
 
 

@@ -17,17 +17,14 @@ from blast_env.envs.display import placing_text
 from blast_env.evaluation.engines import Blast, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Layout
-from blast_env.io.export import LayoutPlan, export_layout
-from blast_env.io.export.dxf import clearance_outlines
-from blast_env.layout import LayoutState, usable_cells
-from blast_env.layout.build_site import vehicle_reach, worst_places
-from blast_env.particles.scene import build_scene
-from blast_env.plots.plan import Kinds, site_features
+from blast_env.io.export import LayoutPlan, clearance_outlines, export_layout
+from blast_env.layout import LayoutState, usable_cells, vehicle_reach, worst_places
+from blast_env.particles import build_scene
+from blast_env.plots import Kinds, site_features
 from blast_env.plots.site_picture import site_picture
-from blast_env.site import Scenario, ScenarioError
-from blast_env.site.blast_site import Charge
-from blast_env.sites.turning import turned
-from blast_env.vehicles.worst_places import stand_off_m
+from blast_env.site import Charge, Scenario, ScenarioError
+from blast_env.sites import turned
+from blast_env.vehicles import stand_off_m
 from tests.builders import block
 from tests.gas_sites import site_document
 from tests.vehicle_sites import gate_site, vehicle_of

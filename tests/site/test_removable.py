@@ -15,11 +15,16 @@ from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece, Removal, layout_words, standing
-from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.layout import LayoutState, load_layout, write_layout
-from blast_env.layout.build_site import build_site, worst_places
-from blast_env.layout.placement import load_relevant
-from blast_env.plots.plan import Kinds, site_features
+from blast_env.io.export import LayoutPlan, bill_of_quantities
+from blast_env.layout import (
+    LayoutState,
+    build_site,
+    load_layout,
+    load_relevant,
+    worst_places,
+    write_layout,
+)
+from blast_env.plots import Kinds, site_features
 from blast_env.site import Scenario, ScenarioError
 from tests.builders import block
 from tests.catalogue_sites import WALL, yard_document

@@ -3,9 +3,8 @@
 import numpy as np
 
 from blast_env.geometry import Layout
-from blast_env.layout.build_site import build_site
-from blast_env.site.blast_site import OUTWARDS, Charge
-from blast_env.site.sight import in_sight
+from blast_env.layout import build_site
+from blast_env.site import OUTWARDS, Charge, in_sight
 from tests.gas_sites import WALL, hut
 
 FRONT = np.array([(6.0, y_m, 1.0) for y_m in (3.25, 4.0, 4.75)])

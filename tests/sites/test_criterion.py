@@ -3,8 +3,7 @@
 import pytest
 
 from blast_env.site import load_scenario
-from blast_env.sites import Objection, VisibilityCriterion, criterion
-from blast_env.sites.criterion import Visibility
+from blast_env.sites import Objection, Visibility, VisibilityCriterion, criterion
 from tests.builders import block
 from tests.sites.cases import yard
 

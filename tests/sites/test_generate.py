@@ -18,8 +18,7 @@ from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
-from blast_env.site import Scenario, SegmentSource
-from blast_env.site.zone import distance_m, source_bounds_m
+from blast_env.site import Scenario, SegmentSource, distance_m, source_bounds_m
 from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
 
 RANGES = SiteRanges()

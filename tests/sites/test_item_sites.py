@@ -12,22 +12,24 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import worst_places
+from blast_env.layout import LayoutState, worst_places
 from blast_env.site import Scenario
 from blast_env.sites import (
     FAMILIES,
     HELD_OUT_SITES,
+    ITEM_KINDS,
     ITEM_SITES,
     LARGE_SITES,
+    POST,
+    TARGETS,
     ItemSiteRanges,
     SiteSource,
+    Visibility,
     close_ranges,
+    cut_share_of,
     generate_site,
     large_ranges,
 )
-from blast_env.sites.criterion import TARGETS, Visibility, cut_share_of
-from blast_env.sites.item_sites import ITEM_KINDS, POST
 from tests.catalogue_sites import yard
 from tests.envs.small import ThinEngine
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle, box_distances_m
-from blast_env.sites.ranges import Draws, SpacedObstacle, draw_place
+from blast_env.sites import Draws, SpacedObstacle, draw_place
 
 AREA = Rectangle(1.0, 2.0, 9.0, 8.0)
 HALVES = st.integers(0, 20).map(lambda count: count / 2.0)

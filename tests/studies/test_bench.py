@@ -9,7 +9,7 @@ from typer.testing import CliRunner, Result
 
 from blast_env import Scenario, simulate
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.layout.build_site import draw_charge
+from blast_env.layout import draw_charge
 from studies import bench
 from studies.bench import SiteCost, blast_cost, site_cost, street
 from studies.side_by_side import ROWS, compare

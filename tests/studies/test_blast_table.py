@@ -13,7 +13,7 @@ from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Piece
 from blast_env.parquet import read_frame, write_table
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge
 from studies import blast_again, blast_table
 from studies.blast_table import COLUMNS
 from tests.evaluation.cases import COURTYARD

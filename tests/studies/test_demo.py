@@ -11,8 +11,7 @@ from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import find_engine
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutState
-from blast_env.site import Scenario, save_scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge, Scenario, save_scenario
 from blast_env.surrogate import site_of
 from studies.demo import (
     AGENT,

@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario
 from blast_env.calibration import PAPER_UFC_LABEL
-from blast_env.particles.paper import LINEAR, POWER, PROPORTIONAL, comparison_table
+from blast_env.particles import LINEAR, POWER, PROPORTIONAL, comparison_table
 from studies import engines, paper
 from studies.engines import HEADERS, Agreement, agreements, relative_difference
 

@@ -6,10 +6,8 @@ from scipy.stats import norm
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.surrogate.correction import Correction, stacked
-from blast_env.surrogate.correction import apart_m3 as apart_from_all_m3
-from blast_env.surrogate.fitting import folds
-from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor
+from blast_env.surrogate import COVERAGE, Correction, covered, folds, interval_factor, stacked
+from blast_env.surrogate import apart_m3 as apart_from_all_m3
 
 NOTHING = np.empty((0, 5))
 

@@ -17,41 +17,43 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import studies.surrogate
-from blast_env.design.rules import random_layout
-from blast_env.design.search import DesignProblem
-from blast_env.design.search.learnt import Guesses, LearntSearch, improved
-from blast_env.design.search.registry import layouts_by_rule
+from blast_env.design import random_layout
+from blast_env.design.search import DesignProblem, Guesses, LearntSearch, improved, layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
-from blast_env.site import AnyCharge, Scenario, load_scenario
-from blast_env.site.blast_site import Charge
-from blast_env.surrogate.engine import SurrogateEngine
-from blast_env.surrogate.fitting import (
+from blast_env.site import AnyCharge, Charge, Scenario, load_scenario
+from blast_env.surrogate import (
+    ABOVE_M,
+    FALLS_M,
+    FEATURES,
+    INPUTS,
     MEMBERS,
-    Predictions,
-    Samples,
-    errors,
-    fit,
-    folds,
-    load_errors,
-)
-from blast_env.surrogate.network import (
     SHAPES,
+    SHARES,
+    STATIONS,
     Check,
     Fit,
     Member,
     Networks,
+    Predictions,
+    Samples,
     Surrogate,
+    SurrogateEngine,
+    WallPoints,
+    Ways,
+    errors,
+    fit,
+    folds,
+    load_errors,
     load_surrogate,
     packaged_surrogate,
+    relations,
+    site_of,
 )
-from blast_env.surrogate.relations import relations
-from blast_env.surrogate.walls import FEATURES, INPUTS, WallPoints, site_of
-from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from studies.blast_table import COLUMNS
 from studies.surrogate import HeldOut, Recipe, verdict
 from tests.catalogue_sites import wide_yard

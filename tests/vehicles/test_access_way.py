@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.site import AccessWay
-from blast_env.site.catalogue import Catalogue
-from blast_env.vehicles.access_way import closing_places, is_open
+from blast_env.site import AccessWay, Catalogue
+from blast_env.vehicles import closing_places, is_open
 from tests.site.zones import can_cross
 
 

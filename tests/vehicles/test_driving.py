@@ -8,17 +8,20 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.bollards import line_of_posts
+from blast_env.design import line_of_posts
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import vehicle_drive, worst_places
+from blast_env.layout import LayoutState, vehicle_drive, worst_places
 from blast_env.sections import Site
-from blast_env.site import Scenario, ScenarioError
-from blast_env.site.sources import VehicleSource
-from blast_env.site.structures import loaded_walls
-from blast_env.vehicles.crash_rating import CrashRating
-from blast_env.vehicles.drive import Obstacles, RatedPiece, VehicleGround
-from blast_env.vehicles.driving import KM_H_PER_M_S, STEP_M, SpeedField
+from blast_env.site import Scenario, ScenarioError, VehicleSource, loaded_walls
+from blast_env.vehicles import (
+    KM_H_PER_M_S,
+    STEP_M,
+    CrashRating,
+    Obstacles,
+    RatedPiece,
+    SpeedField,
+    VehicleGround,
+)
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 
 LORRY: dict[str, Any] = {

@@ -11,15 +11,10 @@ from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import charge_against, vehicle_reach, worst_places
+from blast_env.layout import LayoutState, charge_against, vehicle_reach, worst_places
 from blast_env.sections import Site
-from blast_env.site import AnyCharge, VehicleCharge
-from blast_env.site.blast_site import Charge
-from blast_env.site.sources import VehicleSource, ranked
-from blast_env.vehicles.drive import Obstacles, VehicleGround
-from blast_env.vehicles.reach import Reach
-from blast_env.vehicles.vehicle import Entry
+from blast_env.site import AnyCharge, Charge, VehicleCharge, VehicleSource, ranked
+from blast_env.vehicles import Entry, Obstacles, Reach, VehicleGround
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 
 SIDE = 12

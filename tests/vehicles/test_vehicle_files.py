@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from blast_env.site import ScenarioError
-from blast_env.site.sources import ChargeSource, VehicleSource
+from blast_env.site import ChargeSource, ScenarioError, VehicleSource
 from tests.builders import block
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 

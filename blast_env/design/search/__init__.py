@@ -1,11 +1,18 @@
 """Proposers: classical searches and rules, with their problem (`registry` lists all of them)."""
 
-from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
-from blast_env.design.search.methods import (
-    BestRuleSearch,
-    PopulationAnnealingSearch,
-    RandomSearch,
+from typing import TYPE_CHECKING, Final
+
+from blast_env.design.search.advice import (
+    MeasureKind,
+    advise,
+    advise_until,
+    against_each,
+    kinds_for,
+    only,
 )
+from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
+from blast_env.design.search.methods import BestRuleSearch, PopulationAnnealingSearch, RandomSearch
+from blast_env.design.search.moves import Moves, random_part, random_walls
 from blast_env.design.search.problem import (
     Candidate,
     LayoutAgent,
@@ -18,22 +25,31 @@ from blast_env.design.search.problem import (
 from blast_env.design.search.registry import (
     Need,
     ProposerKind,
+    ProposerRow,
     RuleProposer,
     find_proposer,
     layouts_by_rule,
     proposers,
 )
-from blast_env.design.search.session import Plan, Search, SearchSession
+from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
 from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Layout
+
+if TYPE_CHECKING:
+    from blast_env.design.search.learnt import Guesses, LearntSearch, improved, search_by
+    from blast_env.design.search.operators import cut, individual, layout_of, mixed, repaired
 
 __all__ = [
     "BestRuleSearch",
     "Candidate",
     "DesignProblem",
     "GeneticSearch",
+    "Guesses",
     "Layout",
     "LayoutAgent",
+    "LearntSearch",
+    "MeasureKind",
+    "Moves",
     "Need",
     "Nsga2Search",
     "Plan",
@@ -41,14 +57,46 @@ __all__ = [
     "Progress",
     "Proposer",
     "ProposerKind",
+    "ProposerRow",
     "RandomSearch",
     "Report",
     "RuleProposer",
     "SamplingAgent",
     "Search",
+    "SearchEndedError",
     "SearchResult",
     "SearchSession",
+    "advise",
+    "advise_until",
+    "against_each",
+    "cut",
     "find_proposer",
+    "improved",
+    "individual",
+    "kinds_for",
+    "layout_of",
     "layouts_by_rule",
+    "mixed",
+    "only",
     "proposers",
+    "random_part",
+    "random_walls",
+    "repaired",
+    "search_by",
 ]
+
+_LEARNT: Final = frozenset({"Guesses", "LearntSearch", "improved", "search_by"})
+_OPERATORS: Final = frozenset({"cut", "individual", "layout_of", "mixed", "repaired"})
+
+
+def __getattr__(name: str) -> object:
+    """Import a module on the first use of its names: its libraries take long to import."""
+    if name in _LEARNT:
+        from blast_env.design.search import learnt
+
+        return getattr(learnt, name)
+    if name in _OPERATORS:
+        from blast_env.design.search import operators
+
+        return getattr(operators, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -199,7 +199,7 @@ def _can_reach(
     time_limit_s: float,
     time_s: float,
 ) -> bool:
-    """Return whether a moving ball can still act on a structure; see `blast_env.particles.run.can_reach`.
+    """Return whether a moving ball can still act on a structure, as `run.can_reach` does.
 
     All moving balls are in the heap, so that air at rest takes no time here.
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad
 from blast_env.geometry import Element
-from blast_env.layout.build_site import charge_against
+from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Scenario
 
 

@@ -15,13 +15,11 @@ from ezdxf.layouts.layout import Modelspace
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_to
-from blast_env.io.export.bill import PIECE_COLUMNS
+from blast_env.io.export import PIECE_COLUMNS, SUFFIXES, LayoutPlan, export_layout, export_to
 from blast_env.layout import LayoutFile, load_layout
-from blast_env.particles.scene import build_scene
-from blast_env.plots.plan import SITE_KINDS
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.particles import build_scene
+from blast_env.plots import SITE_KINDS
+from blast_env.site import Charge, Scenario
 
 COURTYARD = load_scenario("courtyard")
 LAYOUT = ((12, 3), (10, 0), (11, 0))  # not sorted: the order of placing is kept

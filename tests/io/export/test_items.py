@@ -10,13 +10,10 @@ from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.filemanagement import readfile
 
 from blast_env import load_scenario
-from blast_env.io.export import LayoutPlan, export_layout
-from blast_env.io.export.bill import BILL_COLUMNS, PIECE_COLUMNS
-from blast_env.layout import LayoutState
-from blast_env.layout.build_site import build_site
-from blast_env.particles.structure import obstacle_of
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.io.export import BILL_COLUMNS, PIECE_COLUMNS, LayoutPlan, export_layout
+from blast_env.layout import LayoutState, build_site
+from blast_env.particles import obstacle_of
+from blast_env.site import Charge, Scenario
 from tests.catalogue_sites import WALL, yard
 
 DUCT: dict[str, Any] = {

@@ -10,8 +10,7 @@ import pytest
 from ezdxf import units
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, import_site, osm, site_map
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing import Fate, ImportOptions, import_site, osm, site_map
 from tests.io.importing.maps import BLOCK, LAYERS, Places, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))

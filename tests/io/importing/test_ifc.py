@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing import Fate, ImportedSite, ImportOptions, import_site
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 

@@ -12,14 +12,19 @@ import shapely
 from pyproj import Transformer
 
 from blast_env.io.export import LayoutPlan, export_layout
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.things import Role
+from blast_env.io.importing import Fate, ImportedSite, ImportOptions, Role, import_site
 from blast_env.layout import usable_cells
 from blast_env.sections import PointM
-from blast_env.site import AnySource, RectangleSource, Scenario, load_scenario, save_scenario
-from blast_env.site.sections import DrawingGeoreference, MapGeoreference
-from blast_env.site.structures import PolygonSection
+from blast_env.site import (
+    AnySource,
+    DrawingGeoreference,
+    MapGeoreference,
+    PolygonSection,
+    RectangleSource,
+    Scenario,
+    load_scenario,
+    save_scenario,
+)
 from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))

@@ -13,8 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, import_site
-from blast_env.io.importing.ledger import MOST_LETTERS, Fate
+from blast_env.io.importing import MOST_LETTERS, Fate, ImportOptions, import_site
 from tests.io.importing.maps import BLOCK, LAYERS
 
 LONG = "W" * 20_000

@@ -8,9 +8,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from blast_env.geometry import fewest_runs
-from blast_env.io.importing.fitting import Deviation
-from blast_env.io.importing.ground import cells_of, in_blocks
-from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
+from blast_env.io.importing import (
+    Deviation,
+    cells_of,
+    dominant_direction_deg,
+    grid_offset_m,
+    in_blocks,
+)
 
 MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 

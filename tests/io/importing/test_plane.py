@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from pyproj import Geod, Transformer
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing.plane import LocalPlane, rotated, to_map
-from blast_env.site.sections import DrawingGeoreference, MapGeoreference
+from blast_env.io.importing import LocalPlane, rotated, to_map
+from blast_env.site import DrawingGeoreference, MapGeoreference
 
 EARTH = Geod(ellps="WGS84")
 

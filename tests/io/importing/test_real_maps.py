@@ -17,10 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, named
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.convert import read_map
-from blast_env.io.importing.ledger import FATES, Fate, Ledger, LedgerEntry
-from blast_env.plots.plan import site_features
+from blast_env.io.importing import (
+    FATES,
+    Fate,
+    ImportedSite,
+    ImportOptions,
+    Ledger,
+    LedgerEntry,
+    import_site,
+    read_map,
+)
+from blast_env.plots import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
 from tests.io.importing.maps import (

@@ -7,8 +7,7 @@ import shapely
 
 from blast_env.app.plan import SketchView
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, import_site
-from blast_env.io.importing.convert import sketch_of
+from blast_env.io.importing import ImportOptions, import_site, sketch_of
 from tests.io.importing.maps import BLOCK, charge, written
 
 

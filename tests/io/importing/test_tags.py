@@ -8,8 +8,7 @@ import pytest
 import shapely
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Fate, LedgerEntry
+from blast_env.io.importing import Fate, ImportedSite, ImportOptions, LedgerEntry, import_site
 from blast_env.site import PointSource, Scenario, SegmentSource
 from tests.io.importing.maps import (
     DEGREE_M,

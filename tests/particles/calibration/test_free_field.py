@@ -9,8 +9,7 @@ from scipy import stats
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.particles.calibration import free_field as study_module
-from blast_env.particles.calibration.free_field import (
+from blast_env.particles.calibration import (
     CalibrationReport,
     FreeFieldStudy,
     calibrate,
@@ -18,7 +17,8 @@ from blast_env.particles.calibration.free_field import (
     kingery_bulmash_reference,
     summarise,
 )
-from blast_env.plots.calibration_figures import calibration_figure
+from blast_env.particles.calibration import free_field as study_module
+from blast_env.plots import calibration_figure
 from blast_env.store import Store
 
 SMALL = load_scenario("free_field").with_simulation(

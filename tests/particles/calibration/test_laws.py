@@ -29,7 +29,7 @@ from blast_env.calibration import (
     shape_rms_percent,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.particles.calibration.laws import Fit
+from blast_env.particles.calibration import Fit
 
 FITS = (fit_proportional, fit_linear, fit_power_law)
 LAWS = (ProportionalLaw(4.27e-5), LinearLaw(-0.017, 4.39e-5), PowerLaw(1.24e-4, 0.881))

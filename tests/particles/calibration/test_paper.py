@@ -12,7 +12,7 @@ from io import StringIO
 import pandas as pd
 import pytest
 
-from blast_env.particles.paper import (
+from blast_env.particles import (
     PAPER_LAWS,
     POWER,
     PROPORTIONAL,

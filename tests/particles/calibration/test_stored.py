@@ -12,22 +12,19 @@ from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines import CALIBRATED_ENGINES
 from blast_env.geometry import Rectangle
-from blast_env.particles.calibration.free_field import (
-    FreeFieldStudy,
-    free_field,
-    kingery_bulmash_reference,
-    paper_reference,
-)
-from blast_env.particles.calibration.model import (
+from blast_env.particles.calibration import (
     CalibrationError,
+    FreeFieldStudy,
     calibrated_engines,
+    kingery_bulmash_reference,
     load_calibration,
+    paper_reference,
     save_calibration,
     seen_width_m,
     stored_calibrations,
 )
-from blast_env.site import Scenario
-from blast_env.site.parameters import preset, with_overrides
+from blast_env.particles.calibration.free_field import free_field
+from blast_env.site import Scenario, preset, with_overrides
 from tests.scenarios import BALLISTIC_COURTYARD
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
