@@ -16,6 +16,7 @@ from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
 from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
+from blast_env.io.importing.vertical import on_the_ground
 from blast_env.units import MODULE_SIDE_M
 
 _QUARTER_SIDES: Final = 4
@@ -75,6 +76,7 @@ def prepared(site: PlacedSite) -> PlacedSite:
     others = [each for each in site.things if each.role is not Role.BUILDING]
     buildings = [_sound(site, each) for each in site.of_role(Role.BUILDING)]
     buildings = without_doubles(buildings, site.ledger)
+    buildings = on_the_ground(buildings, site.options.level_height_m, site.ledger)
     buildings = _with_heights(site, _with_parts(site, buildings))
     return replace(site, things=(*others, *_apart(site, buildings)))
 

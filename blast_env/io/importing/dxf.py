@@ -1,19 +1,23 @@
 """Reading of DXF drawings."""
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
+from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.lengths import UNITS_M
 from blast_env.io.importing.site_map import (
@@ -21,6 +25,7 @@ from blast_env.io.importing.site_map import (
     MOST_POINTS,
     MapFeature,
     SiteMap,
+    Tags,
     check_count,
     errors_of,
 )
@@ -29,6 +34,7 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf import recover, units
     from ezdxf.disassemble import make_primitive
     from ezdxf.document import Drawing
+    from ezdxf.entities.attrib import Attrib
     from ezdxf.entities.dxfentity import DXFEntity
     from ezdxf.entities.insert import Insert
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -36,6 +42,7 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.entities.mtext import MText
     from ezdxf.entities.polygon import DXFPolygon as Polygonal
     from ezdxf.entities.polyline import Polyline
+    from ezdxf.entities.solid import Face3d
     from ezdxf.entities.spline import Spline
     from ezdxf.entities.text import Text
     from ezdxf.filemanagement import readfile
@@ -44,7 +51,6 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.path import Path as DrawnPath
     from ezdxf.path import from_hatch, make_path
     from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
-    from ezdxf.render.mesh import MeshBuilder
     from ezdxf.transform import copies
 
 # What ezdxf mends is on the ledger. Without a handler, its lines with whole texts of a file would
@@ -61,7 +67,9 @@ _MOST_NESTED: Final = 50
 _MOST_TEXT: Final = 1000
 _SAG_M: Final = 0.02  # largest deviation of the chords of an arc
 _ROUNDING: Final = 1e-9  # of the largest coordinate
+_MEET_M: Final = 1e-3  # corners of faces of one body
 _NOWHERE: Final = Point()
+_HIDDEN: Final = "entities that are not shown"
 _AROUND_TEXT: Final = 8  # a hole in a hatch for a text
 _FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
 """Entities whose outline is that of a picture."""
@@ -72,10 +80,10 @@ _LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not add eve
 def read_dxf(site_map: SiteMap) -> None:
     """Read the content of the model space of a DXF file into a map, blocks expanded.
 
-    Closed lines, hatches and footprints of meshes are outlines, texts are points. All have the tag
+    Closed lines, hatches and footprints of bodies are outlines, texts are points. All have the tag
     `layer`: entities on layer 0 of a block take that of the insert. Texts have the tag `text`,
-    entities with a thickness or an extent in z `height` and `min_height`, m. A damaged file is read
-    as far as `ezdxf.recover` can.
+    entities with a thickness and bodies their extent in z. Meshes are bodies, and 3DFACEs that
+    meet. A damaged file is read as far as `ezdxf.recover` can.
 
     The unit is that of the options, one of `UNITS_M`, or that of the file. A drawing in metres may
     have a reference system.
@@ -94,6 +102,7 @@ def read_dxf(site_map: SiteMap) -> None:
         site_map.unit_m = _metres_per_unit(path, document, options.units)
         for feature in _Drawn(site_map, document).features():
             site_map.add(feature)
+        _note_layers(site_map, document)
     if options.crs is not None and site_map.unit_m != 1.0:
         raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
     site_map.crs = options.crs
@@ -113,6 +122,15 @@ def _document(site_map: SiteMap) -> Drawing:
         faults = f"{count} faults mended or skipped" if count else ""
         site_map.ledger.add(Fate.GUESSED, kind, site_map.path.name, detail=faults)
         return document
+
+
+def _note_layers(site_map: SiteMap, document: Drawing) -> None:
+    """Enter the layers that are switched off, which are read as others."""
+    used = {str(each.tags["layer"]).lower() for each in site_map.features}
+    for layer in document.layers:
+        if layer.dxf.name.lower() in used and (layer.is_off() or layer.is_frozen()):
+            kind = "layers that are off or frozen, read as others"
+            site_map.ledger.add(Fate.NOTED, kind, f"layer {named(layer.dxf.name)}")
 
 
 def _set_scales(site_map: SiteMap, document: Drawing) -> None:
@@ -232,11 +250,13 @@ class _Drawn:
         site_map: The map of the drawing.
         document: The drawing.
         skipped: Entities that a block has, but ezdxf cannot place, with the reason.
+        faces: Places and corners of 3DFACEs by layer and insert; those that meet are a body.
     """
 
     site_map: SiteMap
     document: Drawing
     skipped: list[tuple[DXFEntity, str]] = field(default_factory=list)
+    faces: dict[tuple[str, str], list[tuple[str, FloatArray]]] = field(default_factory=dict)
 
     def features(self) -> Iterator[MapFeature]:
         """Yield the features, also those that cannot be used."""
@@ -247,7 +267,13 @@ class _Drawn:
                 handle = _handle(entity) or f"no. {number}"
                 own = handle if part is entity else f"{handle}/{number}"
                 place = f"{_kind(part)} {own} on the layer {named(layer)}"
-                yield self._feature(part, layer, place)
+                if isinstance(part, Face3d) and not _is_hidden(part):
+                    corners = np.array([tuple(each) for each in part.wcs_vertices()])
+                    self._check(corners, place)
+                    insert = "" if part is entity else handle
+                    self.faces.setdefault((layer, insert), []).append((place, corners))
+                else:
+                    yield from self._features(part, layer, place)
             for part, reason in self.skipped:
                 number += 1
                 place = f"{_kind(part)} {_handle(entity)}/{number}"
@@ -255,6 +281,8 @@ class _Drawn:
                 layer = str(part.dxf.get("layer", "0"))
                 yield MapFeature(_NOWHERE, {"layer": layer}, place, kind)
             self.skipped.clear()
+        for (layer, _), faces in self.faces.items():
+            yield from self._of_faces(faces, layer)
 
     def _parts(self, entity: DXFEntity, above: str) -> Iterator[tuple[DXFEntity, str]]:
         """Yield the simple entities of an entity, with their layers.
@@ -265,7 +293,9 @@ class _Drawn:
         """
         layer = str(entity.dxf.get("layer", "0"))
         layer = above if layer == "0" else layer
-        if isinstance(entity, Insert):
+        if _is_hidden(entity):
+            yield entity, layer
+        elif isinstance(entity, Insert):
             block = entity.block()
             if block is None or block.block is None or block.block.is_xref:
                 yield entity, layer
@@ -291,68 +321,104 @@ class _Drawn:
         self.skipped += [(each.entity, each.error.name.lower()) for each in faults]
         return found
 
-    def _feature(self, entity: DXFEntity, layer: str, place: str) -> MapFeature:
+    def _features(self, entity: DXFEntity, layer: str, place: str) -> Iterator[MapFeature]:
+        """Yield the features of a simple entity: several if it is a body of several heights."""
         tags: dict[str, str | float | bool] = {"layer": layer}
-        if isinstance(entity, Text | MText):
-            return _text(entity, tags, place)
-        if entity.dxftype() == "POINT":
-            return MapFeature(Point(entity.dxf.location.x, entity.dxf.location.y), tags, place)
-        try:
-            geometry, heights = self._geometry(entity, place)
-        except (TypeError, ValueError, DXFError) as error:
-            if isinstance(error, BlastEnvError):
-                raise
-            kind = "references to other files, or to blocks that are not there"
-            if not isinstance(entity, Insert):
-                kind = f"entities of the type {_kind(entity)}"
-            return MapFeature(_NOWHERE, tags, place, kind)
-        if geometry.is_empty:
-            return MapFeature(_NOWHERE, tags, place, "entities without an extent in plan")
-        thickness = entity.dxf.get("thickness", 0.0) if entity.dxf.is_supported("thickness") else 0
-        base, top = heights[0], heights[1] if _is_mesh(entity) else heights[0] + abs(thickness)
-        if top > max(base, 0.0):
-            tags["height"] = self.site_map.unit_m * top
-            if base > 0.0:
-                tags["min_height"] = self.site_map.unit_m * base
-        return MapFeature(geometry, tags, place)
+        if _is_hidden(entity):
+            yield MapFeature(_NOWHERE, tags, place, _HIDDEN)
+        elif isinstance(entity, Text | MText):
+            yield _text(entity, tags, place)
+        elif entity.dxftype() == "POINT":
+            yield MapFeature(Point(entity.dxf.location.x, entity.dxf.location.y), tags, place)
+        else:
+            try:
+                yield from list(self._shapes(entity, tags, place))
+            except (TypeError, ValueError, DXFError) as error:
+                if isinstance(error, BlastEnvError):
+                    raise
+                kind = "references to other files, or to blocks that are not there"
+                if not isinstance(entity, Insert):
+                    kind = f"entities of the type {_kind(entity)}"
+                yield MapFeature(_NOWHERE, tags, place, kind)
 
-    def _geometry(self, entity: DXFEntity, place: str) -> tuple[BaseGeometry, tuple[float, float]]:
-        """Return the outline or line of an entity, and its lowest and highest z.
+    def _shapes(self, entity: DXFEntity, tags: Tags, place: str) -> Iterator[MapFeature]:
+        """Yield the outlines, the line or the body of an entity.
 
         Raises:
             TypeError: If it has none.
         """
         if _is_mesh(entity):
-            return self._footprint(make_primitive(entity).mesh, place)
+            mesh = make_primitive(entity).mesh
+            vertices = np.array([tuple(each) for each in mesh.vertices] if mesh else [])
+            self._check(vertices, place)
+            faces = [vertices[list(face)] for face in mesh.faces] if mesh else []
+            yield from self._body(faces, tags, place)
+            return
         if isinstance(entity, Polygonal):
             entity.paths.paths = [
                 each for each in entity.paths if not each.path_type_flags & _AROUND_TEXT
             ]
             rings = [self._places(line, place) for line in from_hatch(entity)]
             lines = [LineString([*ring[:, :2], ring[0, :2]]) for ring in rings if len(ring) > 2]
-            return shapely.build_area(shapely.GeometryCollection(lines)), (0.0, 0.0)
+            yield _shown(shapely.build_area(shapely.GeometryCollection(lines)), tags, place)
+            return
         if entity.dxftype() in _FRAMES:
             raise TypeError
         points = self._places(make_path(entity), place)
         if len(points) < 2:
-            return _NOWHERE, (0.0, 0.0)
-        heights = float(points[:, 2].min()), float(points[:, 2].max())
-        if len(points) > 3 and _closes(points[:, :2]):
-            return Polygon(points[:, :2]), heights
-        return LineString(points[:, :2]), heights
+            yield _shown(_NOWHERE, tags, place)
+            return
+        rise = _rise(entity)
+        if np.hypot(*rise[:2]) > _ROUNDING * float(np.abs(rise).max()):  # swept aside
+            yield from self._body(_swept(points, rise), tags, place)
+            return
+        is_area = len(points) > 3 and _closes(points[:, :2])
+        geometry = (Polygon if is_area else LineString)(points[:, :2])
+        ends = [points[:, 2].min(), points[:, 2].max()]
+        heights_m = self.site_map.unit_m * np.array([*ends, *(ends + rise[2])])
+        extent_m = (float(heights_m.min()), float(heights_m.max())) if rise[2] else None
+        yield _shown(geometry, tags, place, extent_m)
 
-    def _footprint(
-        self, mesh: MeshBuilder | None, place: str
-    ) -> tuple[BaseGeometry, tuple[float, float]]:
-        """Return the area below the faces of a mesh, and its lowest and highest z."""
-        if mesh is None or not mesh.vertices:
-            return _NOWHERE, (0.0, 0.0)
-        vertices = np.array([tuple(each) for each in mesh.vertices])
-        self._check(vertices, place)
-        faces = [vertices[list(face)][:, :2] for face in mesh.faces if len(face) > 2]
-        shadows = [Polygon(face) for face in faces]
-        footprint = shapely.union_all([each for each in shadows if each.is_valid and each.area])
-        return footprint, (float(vertices[:, 2].min()), float(vertices[:, 2].max()))
+    def _body(self, corners: Sequence[FloatArray], tags: Tags, place: str) -> Iterator[MapFeature]:
+        """Yield the parts of a body with these faces, each (k, 3)."""
+        unit_m = self.site_map.unit_m
+        faces = Faces.of([unit_m * each for each in corners if len(each) > 2])
+        shadow = faces.shadow if len(faces.plans) else _NOWHERE
+        if shadow.is_empty:
+            yield _shown(_NOWHERE, tags, place)
+            return
+        low_m, high_m = float(faces.low_m.min()), float(faces.high_m.max())
+        if low_m == high_m:
+            yield _shown(_in_units(shadow, unit_m), tags, place)
+            return
+        feet = list(faces.plans[faces.low_m <= low_m + LEAST_STOREY_M])
+        parts = faces.parts(low_m, feet, self.site_map.options.least_area_m2, 0.0)
+        for each in parts or [BodyPart(shadow, low_m, high_m)]:
+            part_of = place if len(parts) > 1 else ""
+            extent_m = each.base_m, each.top_m
+            outline = _in_units(each.outline, unit_m)
+            yield MapFeature(outline, tags, place, extent_m=extent_m, part_of=part_of)
+
+    def _of_faces(
+        self, faces: Sequence[tuple[str, FloatArray]], layer: str
+    ) -> Iterator[MapFeature]:
+        """Yield the bodies that 3DFACEs of a layer make, each at the place of its first face."""
+        tags: Tags = {"layer": layer}
+        size = max(float(np.abs(corners).max()) for _, corners in faces)
+        vertices = np.concatenate([corners for _, corners in faces])
+        owners = np.repeat(np.arange(len(faces)), [len(corners) for _, corners in faces])
+        near = cKDTree(vertices).query_pairs(
+            max(_MEET_M / self.site_map.unit_m, _ROUNDING * size), output_type="ndarray"
+        )
+        links = coo_array((np.ones(len(near)), owners[near.T]), shape=(len(faces), len(faces)))
+        _, body = connected_components(links, directed=False)
+        for number in range(body.max() + 1):
+            own = [faces[k] for k in np.flatnonzero(body == number).tolist()]
+            first = own[0][0]
+            yield from self._body([corners for _, corners in own], tags, first)
+            for place, _ in own[1:]:
+                kind, detail = "faces of a body", f"of {first}"
+                self.site_map.ledger.add(Fate.MERGED, kind, place, detail=detail)
 
     def _places(self, line: DrawnPath, place: str) -> FloatArray:
         """Return the points of a line (n, 3), arcs as chords.
@@ -384,7 +450,41 @@ def _is_mesh(entity: DXFEntity) -> bool:
     return isinstance(entity, Mesh)
 
 
-def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str) -> MapFeature:
+def _is_hidden(entity: DXFEntity) -> bool:
+    """Return whether an entity is not shown, as those of another state of a dynamic block."""
+    return bool(entity.dxf.get("invisible", 0)) or (
+        isinstance(entity, Attrib) and entity.is_invisible
+    )
+
+
+def _rise(entity: DXFEntity) -> FloatArray:
+    """Return the way along which an entity with a thickness is extruded; 0 without one."""
+    if not entity.dxf.is_supported("thickness"):
+        return np.zeros(3)
+    up = Vec3(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)))
+    thickness = float(entity.dxf.get("thickness", 0.0))
+    return np.array(tuple(up.normalize(thickness) if thickness and up else (0.0, 0.0, 0.0)))
+
+
+def _swept(points: FloatArray, rise: FloatArray) -> list[FloatArray]:
+    """Return the faces of a line that is moved, and its two ends if it is an outline."""
+    sides = [np.array([a, b, b + rise, a + rise]) for a, b in pairwise(points)]
+    return [*sides, points, points + rise] if _closes(points) else sides
+
+
+def _shown(
+    geometry: BaseGeometry, tags: Tags, place: str, extent_m: tuple[float, float] | None = None
+) -> MapFeature:
+    fault = "entities without an extent in plan" if geometry.is_empty else ""
+    return MapFeature(geometry, tags, place, fault, extent_m=extent_m)
+
+
+def _in_units(outline: BaseGeometry, unit_m: float) -> BaseGeometry:
+    """Return an outline in metres in the unit of the drawing."""
+    return shapely.transform(outline, lambda places: places / unit_m)
+
+
+def _text(entity: Text | MText, tags: Tags, place: str) -> MapFeature:
     """Return the middle of a text as a point."""
     insert = entity.dxf.insert
     if isinstance(entity, MText):
@@ -392,7 +492,7 @@ def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str)
     words = entity.plain_text()[:_MOST_TEXT]
     if isinstance(entity, Text):
         _, first, second = entity.get_placement()
-        insert = first if second is None else second
+        insert = entity.ocs().to_wcs(Vec3(first if second is None else second))
     point = Point(float(insert[0]), float(insert[1]))
     return MapFeature(point, {**tags, "text": " ".join(str(words).split())}, place)
 

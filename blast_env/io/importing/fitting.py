@@ -13,7 +13,8 @@ from blast_env.errors import BlastEnvError, import_extra, named, quoted, shorten
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.outlines import areas_of, check_outlines, walls_of
-from blast_env.io.importing.placing import OUTSIDE, PlacedSite
+from blast_env.io.importing.panes import fitted
+from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.footprint import Footprint, footprint_of
 from blast_env.units import MODULE_SIDE_M
@@ -199,6 +200,8 @@ def _fitted(
     if thing.height_m is not None:
         height_m = max(round(thing.height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
         base_m = max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
+    walls_m = [wall.length_m for own in polygons for wall in own.walls]
+    rise_m = 0.0 if height_m is None else height_m - base_m
     return FittedBuilding(
         name=name,
         title=shortened(thing.name, MOST_TITLE),
@@ -212,7 +215,7 @@ def _fitted(
         part_of=thing.part_of,
         deviation=off,
         is_cut=bool(shapely.intersects(thing.geometry, site.box.boundary)),
-        facade=thing.facade,
+        facade=fitted(thing.facade, walls_m, rise_m, thing.place, site.ledger),
     )
 
 
@@ -230,7 +233,7 @@ def _kept(site: PlacedSite) -> list[Thing]:
     for thing, outline, shape in zip(site.of_role(Role.BUILDING), outlines, inside, strict=True):
         area = areas_of(shape)
         if shape.is_empty:
-            site.ledger.add(Fate.PASSED, OUTSIDE, thing.place, thing.name)
+            site.ledger.add(*site.beyond, thing.place, thing.name)
         elif area.area < least_m2:
             kind = f"buildings of less than {least_m2:g} m2 (--least-area)"
             detail = f"{area.area:.1f} m2 on the site"

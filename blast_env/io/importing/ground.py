@@ -22,7 +22,7 @@ from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import PlaceXY
 from blast_env.io.importing.outlines import check_outlines, mended
 from blast_env.io.importing.passages import Mouths, mouths_of
-from blast_env.io.importing.placing import OUTSIDE, PlacedSite
+from blast_env.io.importing.placing import PlacedSite
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
@@ -95,7 +95,7 @@ def charge_sources(
     for each in site.of_role(Role.CHARGE):
         if each.place not in used:
             on_site = shapely.intersects(each.geometry, site.box)
-            fate, kind = (Fate.LEFT_OUT, _BUILT_OVER) if on_site else (Fate.PASSED, OUTSIDE)
+            fate, kind = (Fate.LEFT_OUT, _BUILT_OVER) if on_site else site.beyond
             site.ledger.add(fate, kind, each.place, each.name)
         elif each.width_m is not None and not has_kerbs:
             kind = "streets of too many bends, with charges on the centre line instead of the kerbs"

@@ -1,21 +1,21 @@
 """Reading of building models in IFC: walls, slabs, roofs, storeys and windows."""
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
-from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.bodies import Faces
+from blast_env.io.importing.ifc_building import Building, Solid, is_window
+from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
     MapFeature,
     SiteMap,
+    Tags,
     check_count,
     errors_of,
 )
@@ -27,162 +27,255 @@ with import_extra("ifc", "building models"):
     from ifcopenshell.util import placement
     from ifcopenshell.util.unit import calculate_unit_scale
 
-_SHAPED: Final = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate", "IfcWindow")
-_GAP_M: Final = 0.3
-"""Gap between walls and slabs that is closed."""
+_WALLS: Final = ("IfcWall",)
+_SHAPED: Final = (*_WALLS, "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate", "IfcWindow")
+"""What a building is made of."""
 
+_POSTS: Final = ("IfcColumn", "IfcMember", "IfcDoor", "IfcPile", "IfcFooting")
+"""What else may stand on the ground below a building, or close a gap of its walls."""
+
+_PASSED: Final = ("IfcFeatureElement", "IfcSpace", "IfcSpatialZone", "IfcAnnotation", "IfcGrid")
+"""Holes in walls, which are in their shapes, rooms and drawings."""
+
+_PARTS: Final = "parts of a building"
+_ASSEMBLIES: Final = "assemblies, read by their parts"
+_LEAST_WALL_M: Final = 0.5
 _GLASS: Final = "glass, which IFC does not state"
-_GROUND_M: Final = 0.5
-_LEAST_STOREY_M: Final = 1.5
-_BAYS_M: Final = (1.0, 50.0)
+_NORTH: Final = "north of the model, which the import does not turn to"
+_ON_EARTH: Final = "place of the model on the Earth, which is not read"
+_STRAIGHT: Final = 1e-6
 _NOWHERE: Final = shapely.Point()
-
-
-@dataclass(frozen=True)
-class _Solid:
-    """An element with its extent, m.
-
-    Attributes:
-        element: The element.
-        ground: The area below it.
-        low_m: Its lowest height.
-        high_m: Its highest one.
-    """
-
-    element: Any
-    ground: BaseGeometry
-    low_m: float
-    high_m: float
 
 
 def read_ifc(site_map: SiteMap) -> None:
     """Read the buildings of an IFC model, in metres, each with its height, storeys and windows.
 
-    A building is what its walls, slabs and roofs cover. Everything else is on the ledger.
+    A building is what its walls, slabs and roofs cover, in parts of different heights. Walls of
+    the site stand for themselves. Everything else is on the ledger.
 
     Raises:
         BlastEnvError: If the file cannot be read, states no unit of length, or has no building.
     """
-    path, options, ledger = site_map.path, site_map.options, site_map.ledger
+    path, options = site_map.path, site_map.options
     options.refuse("IFC, which states its unit", "units", "height_unit")
     options.refuse("IFC, which is in metres of its own", "crs")
     with errors_of("ifcopenshell", path, "IFC"):
         model = ifcopenshell.open(str(path))
-        lengths = [each for each in model.by_type("IfcNamedUnit") if each.UnitType == "LENGTHUNIT"]
-        if not lengths:
+        if not any(each.UnitType == "LENGTHUNIT" for each in _units(model)):
             raise BlastEnvError(f"{path}: states no unit of length, must state one")
-        products = [each for each in model.by_type("IfcElement") if each.Representation]
-        check_count(path, len(products), MOST_FEATURES, "outlines and lines")
-        buildings = model.by_type("IfcBuilding")
-        if not buildings:
+        if not model.by_type("IfcBuilding"):
             raise BlastEnvError(f"{path}: has no IfcBuilding")
-        chosen = [each for each in products if any(map(each.is_a, _SHAPED))]
-        solids = {each.element.id(): each for each in _solids(model, chosen)}
-        owners = {each.id(): _building_of(each, buildings) for each in chosen}
-        for building in buildings:
-            own = [each for key, each in solids.items() if owners[key] == building]
-            found = _building(model, building, own)
-            if found is None:
+        reader = _Model(site_map, model)
+        reader.read()
+        _note_place(model, site_map.ledger, path.name)
+
+
+def _units(model: Any) -> list[Any]:
+    """Return the named units of a project."""
+    assigned = [each.UnitsInContext for each in model.by_type("IfcProject")]
+    units = [unit for each in assigned if each is not None for unit in each.Units or ()]
+    return [each for each in units if each.is_a("IfcNamedUnit")]
+
+
+def _note_place(model: Any, ledger: Ledger, name: str) -> None:
+    """Enter the direction of north and the place on the Earth, which an import does not use."""
+    for context in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False):
+        ratios = context.TrueNorth and context.TrueNorth.DirectionRatios
+        if ratios and len(ratios) > 1 and abs(ratios[0]) > _STRAIGHT * abs(ratios[1]):
+            angle_deg = float(np.degrees(np.arctan2(ratios[0], ratios[1])))
+            detail = f"{angle_deg:.1f} degrees clockwise from its y axis"
+            ledger.add(Fate.NOTED, _NORTH, name, detail=detail)
+    kinds = () if model.schema == "IFC2X3" else ("IfcCoordinateOperation",)
+    if any(model.by_type(each) for each in kinds) or any(
+        each.RefLatitude or each.RefLongitude for each in model.by_type("IfcSite")
+    ):
+        ledger.add(Fate.NOTED, _ON_EARTH, name)
+
+
+class _Model:
+    """The elements of a model by their buildings.
+
+    Args:
+        site_map: The map that they are added to.
+        model: The model.
+    """
+
+    def __init__(self, site_map: SiteMap, model: Any) -> None:
+        self._map, self._model = site_map, model
+        self._scale = calculate_unit_scale(model)
+        self._buildings = model.by_type("IfcBuilding")
+        self._products = [each for each in model.by_type("IfcProduct") if _is_object(each)]
+        check_count(site_map.path, len(self._products), MOST_FEATURES, "outlines and lines")
+        ids = Counter(each.GlobalId for each in model.by_type("IfcProduct"))
+        self._twice = {each for each, count in ids.items() if count > 1}
+
+    def read(self) -> None:
+        """Add the buildings, the walls of the site, and all else with the reason."""
+        chosen = [each for each in self._products if _is_any(each, (*_SHAPED, *_POSTS))]
+        solids = {each.element.id(): each for each in self._solids(chosen)}
+        owners = {each.id(): self._owner(each) for each in self._products}
+        if not any(owners[key] for key in solids) and len(self._buildings) == 1:
+            owners = dict.fromkeys(owners, self._buildings[0])  # all hangs at the site
+        used: set[int] = set()
+        reasons, grounds_m = dict[int, str](), list[float]()
+        for entity in self._buildings:
+            own = [each for key, each in solids.items() if owners[key] == entity]
+            building = self._building(entity, own)
+            grounds_m.append(building.ground_m)
+            used |= self._add(building)
+            reasons |= {each.element.id(): building.reason(each) for each in own}
+        lonely = [each for key, each in solids.items() if owners[key] is None]
+        used |= self._add_of_site(lonely, min(grounds_m, default=0.0))
+        for each in self._products:
+            if each.id() not in used:
+                self._leave(each, solids.get(each.id()), reasons.get(each.id(), ""))
+
+    def _solids(self, elements: list[Any]) -> Iterator[Solid]:
+        """Yield the elements that have a shape."""
+        elements = [each for each in elements if each.Representation]
+        if not elements:
+            return
+        settings = ifcopenshell.geom.settings()
+        settings.set("use-world-coords", True)
+        iterator = ifcopenshell.geom.iterator(settings, self._model, include=elements)
+        more = iterator.initialize()
+        while more:
+            shape = iterator.get()
+            corners = np.reshape(shape.geometry.verts, (-1, 3))
+            triangles = corners[np.reshape(shape.geometry.faces, (-1, 3))]
+            if len(triangles) and np.isfinite(triangles).all():
+                element = self._model.by_id(shape.id)
+                is_post = not _is_any(element, _SHAPED)
+                yield Solid(element, self._place(element), is_post, Faces.of_triangles(triangles))
+            more = iterator.next()
+
+    def _owner(self, element: Any) -> Any:
+        """Return the building that holds an element, the only one those that nothing holds.
+
+        What the site holds belongs to none: `None`.
+        """
+        found = relations.get_container(element) or _container_of_wall(element)
+        if found is None:
+            return self._buildings[0] if len(self._buildings) == 1 else None
+        while found is not None and not found.is_a("IfcBuilding"):
+            found = relations.get_aggregate(found)
+        return found
+
+    def _building(self, entity: Any, solids: list[Solid]) -> Building:
+        base_m = self._placed_m(entity)
+        storeys = [
+            each
+            for each in self._model.by_type("IfcBuildingStorey")
+            if self._owner_of_storey(each) == entity
+        ]
+        storeys_m = [self._placed_m(each) for each in storeys]
+        stated_m = [base_m + self._scale * float(each.Elevation or 0.0) for each in storeys]
+        if len({*stated_m}) > len({*storeys_m}):  # all storeys are placed at one height
+            storeys_m = stated_m
+        stated = [
+            ("its ElevationOfRefHeight", entity.ElevationOfRefHeight),
+            ("its ElevationOfTerrain", entity.ElevationOfTerrain),
+        ]
+        site = relations.get_aggregate(entity)
+        if site is not None and site.is_a("IfcSite"):
+            stated.append(("the RefElevation of the site", site.RefElevation))
+        heights_m = [
+            (words, self._scale * float(value)) for words, value in stated if value is not None
+        ]
+        return Building(
+            place=self._place(entity),
+            name=str(entity.Name or entity.LongName or ""),
+            solids=tuple(solids),
+            storeys_m={each.id(): at_m for each, at_m in zip(storeys, storeys_m, strict=True)},
+            placed_m=base_m,
+            stated_m=tuple(heights_m),
+            options=self._map.options,
+        )
+
+    def _owner_of_storey(self, storey: Any) -> Any:
+        found = relations.get_aggregate(storey)
+        while found is not None and not found.is_a("IfcBuilding"):
+            found = relations.get_aggregate(found)
+        return self._buildings[0] if found is None and len(self._buildings) == 1 else found
+
+    def _placed_m(self, product: Any) -> float:
+        """Return the height at which a product is placed, m."""
+        if product.ObjectPlacement is None:
+            return 0.0
+        matrix = placement.get_local_placement(product.ObjectPlacement)
+        return float(self._scale * matrix[2, 3])
+
+    def _add(self, building: Building) -> set[int]:
+        """Add a building; return the ids of its elements that are read."""
+        ledger, place = self._map.ledger, building.place
+        parts = building.parts
+        if not parts:
+            tags: Tags = {"building": "yes", "name": building.name}
+            self._map.add(MapFeature(_NOWHERE, tags, place, "buildings without walls"))
+            return set()
+        for part in parts:
+            self._map.add(part)
+        building.note(ledger)
+        if any(part.facade for part in parts):
+            ledger.add(Fate.GUESSED, _GLASS, place, detail="annealed 6 mm")
+        read = building.read
+        for solid, kind in read:
+            ledger.add(Fate.MERGED, kind or _PARTS, solid.place, detail=f"of {place}")
+        return {solid.element.id() for solid, _ in read}
+
+    def _add_of_site(self, solids: Sequence[Solid], ground_m: float) -> set[int]:
+        """Add what stands on the site outside of buildings; return the ids of what is read."""
+        used = set()
+        for solid in solids:
+            if solid.is_post or is_window(solid):
                 continue
-            site_map.add(found)
-            for each in own:
-                detail = f"of {found.place}"
-                ledger.add(Fate.MERGED, "parts of a building", _place(each.element), detail=detail)
-            if found.facade:
-                ledger.add(Fate.GUESSED, _GLASS, found.place, detail="annealed 6 mm")
-    for each in products:
-        if each.id() not in solids:
-            tags: dict[str, str | float | bool] = {each.is_a(): True, "building": "part"}
-            site_map.add(MapFeature(_NOWHERE, tags, _place(each), _reason(each)))
+            least_m = _LEAST_WALL_M if _is_any(solid.element, _WALLS) else None
+            for part in solid.parts(ground_m, self._map.options.least_area_m2, least_m):
+                kind = "wall" if _is_any(solid.element, _WALLS) else "yes"
+                tags: Tags = {"building": kind, "name": str(solid.element.Name or "")}
+                extent_m = part.base_m - ground_m, part.top_m - ground_m
+                self._map.add(
+                    MapFeature(
+                        part.outline, tags, solid.place, extent_m=extent_m, part_of=solid.place
+                    )
+                )
+                used.add(solid.element.id())
+        return used
+
+    def _leave(self, element: Any, solid: Solid | None, reason: str) -> None:
+        """Add an element that is not read, with the reason."""
+        place, kind = self._place(element), element.is_a()
+        if _is_any(element, _PASSED):
+            self._map.ledger.add(Fate.PASSED, f"{kind} of the model", place)
+        elif not element.Representation and getattr(element, "IsDecomposedBy", None):
+            self._map.ledger.add(Fate.MERGED, _ASSEMBLIES, place)
+        else:
+            reason = reason or "of buildings"
+            if solid is None and _is_any(element, _SHAPED):
+                reason = "without a shape"
+            tags: Tags = {"building": "part"}
+            self._map.add(MapFeature(_NOWHERE, tags, place, f"{kind} {reason}"))
+
+    def _place(self, element: Any) -> str:
+        """Return the place of an element: its class and id, with its number if two have the id."""
+        text = f"{element.is_a()} {named(str(element.GlobalId))}"
+        return f"{text} #{element.id()}" if element.GlobalId in self._twice else text
 
 
-def _reason(element: Any) -> str:
-    is_used = any(map(element.is_a, _SHAPED))
-    return f"{element.is_a()} {'without a shape' if is_used else 'of buildings'}"
+def _is_object(product: Any) -> bool:
+    """Return whether a product is an object of the model, not only a level or a mark."""
+    if product.is_a("IfcBuilding"):
+        return False
+    return bool(product.is_a("IfcElement") or product.Representation)
 
 
-def _place(element: Any) -> str:
-    return f"{element.is_a()} {named(str(element.GlobalId))}"
+def _is_any(element: Any, kinds: Sequence[str]) -> bool:
+    return any(map(element.is_a, kinds))
 
 
-def _solids(model: Any, elements: list[Any]) -> Iterator[_Solid]:
-    """Yield the elements that have a shape."""
-    settings = ifcopenshell.geom.settings()
-    settings.set("use-world-coords", True)
-    if not elements:
-        return
-    iterator = ifcopenshell.geom.iterator(settings, model, include=elements)
-    more = iterator.initialize()
-    while more:
-        shape = iterator.get()
-        corners = np.reshape(shape.geometry.verts, (-1, 3))
-        faces = corners[np.reshape(shape.geometry.faces, (-1, 3))]
-        areas = np.asarray(shapely.polygons(faces[:, :, :2]))
-        ground = shapely.union_all(areas[shapely.area(areas) > 0.0], grid_size=1e-4)
-        heights_m = corners[:, 2]
-        yield _Solid(model.by_id(shape.id), ground, heights_m.min(), heights_m.max())
-        more = iterator.next()
-
-
-def _building_of(element: Any, buildings: list[Any]) -> Any:
-    """Return the building that holds an element; the only one of a file holds all."""
-    found = relations.get_container(element)
-    while found is not None and not found.is_a("IfcBuilding"):
-        found = relations.get_aggregate(found)
-    return buildings[0] if found is None and len(buildings) == 1 else found
-
-
-def _building(model: Any, building: Any, solids: list[_Solid]) -> MapFeature | None:
-    """Return the outline of a building, its height, storeys and windows; `None` without walls."""
-    scale = calculate_unit_scale(model)
-    ground_m = 0.0
-    if building.ObjectPlacement is not None:
-        ground_m = scale * float(placement.get_local_placement(building.ObjectPlacement)[2, 3])
-    windows = [each for each in solids if each.element.is_a("IfcWindow")]
-    above = [each for each in solids if each.high_m > ground_m and each not in windows]
-    if not above:
-        return None
-    outline = shapely.union_all([each.ground.buffer(0.5 * _GAP_M) for each in above])
-    outline = outline.buffer(-0.5 * _GAP_M, join_style="mitre")
-    height_m = max(each.high_m for each in above) - ground_m
-    floors_m = [
-        scale * float(each.Elevation or 0.0)
-        for each in model.by_type("IfcBuildingStorey")
-        if _building_of(each, [building]) == building
-    ]
-    storeys = sum(-_GROUND_M <= each <= height_m - _LEAST_STOREY_M for each in floors_m)
-    tags: dict[str, str | float | bool] = {"building": "yes", "height": float(height_m)}
-    if building.Name:
-        tags["name"] = str(building.Name)
-    facade: dict[str, float] = {}
-    if windows:
-        facade = _facade(outline, windows, max(storeys, 1), np.sort(floors_m) + ground_m)
-    return MapFeature(outline, tags, _place(building), facade=facade)
-
-
-def _facade(
-    outline: BaseGeometry, windows: list[_Solid], storeys: int, floors_m: FloatArray
-) -> dict[str, float]:
-    """Return the facade of a building: its storeys, and the commonest window and its spacing."""
-    sizes = Counter(
-        (round(_width_m(each), 1), round(each.high_m - each.low_m, 1)) for each in windows
-    )
-    (width_m, height_m), _ = sizes.most_common(1)[0]
-    sills_m = [
-        each.low_m - max((floor for floor in floors_m if floor <= each.low_m), default=each.low_m)
-        for each in windows
-    ]
-    apart_m = max(outline.length * storeys / len(windows), 1.1 * width_m)
-    return {
-        "storeys": float(storeys),
-        "width": width_m,
-        "height": height_m,
-        "sill": round(float(np.median(sills_m)), 2),
-        "bay": round(float(np.clip(apart_m, *_BAYS_M)), 1),
-    }
-
-
-def _width_m(window: _Solid) -> float:
-    """Return the longer side of a window in plan, m."""
-    corners = shapely.get_coordinates(window.ground.minimum_rotated_rectangle)
-    return float(np.hypot(*np.diff(corners, axis=0).T).max())
+def _container_of_wall(element: Any) -> Any:
+    """Return what holds the wall in which a window or door is."""
+    for fills in getattr(element, "FillsVoids", None) or ():
+        for voids in fills.RelatingOpeningElement.VoidsElements or ():
+            return relations.get_container(voids.RelatingBuildingElement)
+    return None

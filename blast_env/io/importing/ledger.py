@@ -25,13 +25,17 @@ class Fate(StrEnum):
     MERGED = "merged"
     CUT = "cut"
     CLOSED = "closed"
+    NOTED = "noted"
     GUESSED = "guessed"
     LEFT_OUT = "left out"
     PASSED = "not of the site"
 
 
-CHANGES: Final = (Fate.MERGED, Fate.CUT, Fate.CLOSED, Fate.GUESSED, Fate.LEFT_OUT)
-"""The entries that change the site, which are notes of an import."""
+CHANGES: Final = (
+    *(Fate.MERGED, Fate.CUT, Fate.CLOSED, Fate.NOTED),
+    *(Fate.GUESSED, Fate.LEFT_OUT),
+)
+"""The entries that change the site or say how it lies, which are notes of an import."""
 
 STRICT: Final = (Fate.GUESSED, Fate.LEFT_OUT)
 """The fates that `--strict` refuses."""
@@ -71,7 +75,8 @@ class LedgerEntry:
 class Ledger:
     """The entries of an import; see `Fate`.
 
-    Every object of a file has one entry of `FATES`, and maybe remarks: cut, closed, guessed.
+    Every object of a file has one entry of `FATES`, and maybe remarks: cut, closed, noted,
+    guessed.
 
     Attributes:
         entries: All entries, in the order of the fates done.

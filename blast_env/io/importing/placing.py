@@ -29,6 +29,7 @@ from blast_env.site.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
 
 OUTSIDE: Final = "outside the site"
+OUTSIDE_OWN: Final = "outside the outline of the site in the file, its layer or kind `site`"
 _EXCHANGED: Final = ": are longitude and latitude exchanged?"
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 _WIDER: Final = "ground around buildings, widened to the nearest street"
@@ -69,6 +70,15 @@ class PlacedSite:
     def size_m(self) -> tuple[float, float]:
         """Extents along x and y, m."""
         return self.shape[1] * MODULE_SIDE_M, self.shape[0] * MODULE_SIDE_M
+
+    @property
+    def beyond(self) -> tuple[Fate, str]:
+        """Fate and kind of buildings and charges outside the site.
+
+        They are left out where no option but an outline in the file cuts the site.
+        """
+        own = self.options.size_m is None and bool(self.of_role(Role.SITE))
+        return (Fate.LEFT_OUT, OUTSIDE_OWN) if own else (Fate.PASSED, OUTSIDE)
 
     @cached_property
     def box(self) -> BaseGeometry:

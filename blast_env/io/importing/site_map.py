@@ -48,6 +48,9 @@ class MapFeature:
             is.
         facade: Number of storeys, width, height and sill of its windows, and the width of a bay,
             m; empty if the source has none.
+        extent_m: Its lowest and highest z, m, in a drawing or model; `None` if tags say its
+            heights.
+        part_of: Place in the file of the building of which it is a part, or an empty string.
     """
 
     geometry: BaseGeometry
@@ -55,6 +58,8 @@ class MapFeature:
     place: str
     fault: str = ""
     facade: Mapping[str, float] = field(default_factory=dict)
+    extent_m: tuple[float, float] | None = None
+    part_of: str = ""
 
 
 @dataclass
@@ -113,11 +118,11 @@ class SiteMap:
         }
         self.ledger.entries = list(_one_fate_each(self.ledger.entries, set(used)))
         fates = {each.place for each in self.ledger.of(*FATES)}
-        for feature in self.features:
-            if feature.place in used:
-                self.ledger.add(Fate.READ, used[feature.place], feature.place)
-            elif feature.place not in fates:
-                self.ledger.add(Fate.LEFT_OUT, _UNUSED, feature.place)
+        for place in dict.fromkeys(each.place for each in self.features):
+            if place in used:
+                self.ledger.add(Fate.READ, used[place], place)
+            elif place not in fates:
+                self.ledger.add(Fate.LEFT_OUT, _UNUSED, place)
         elsewhere = {each.place for each in self.ledger.of(Fate.PASSED)}
         self.ledger.entries = [
             replace(each, position=positions.get(each.place))

@@ -53,6 +53,7 @@ class Thing:
         width_m: Width of a street, m.
         is_part: Whether it is a part of a building with a height of its own.
         facade: Its storeys and windows, see `MapFeature`.
+        has_z: Whether its heights are coordinates of a drawing or model, from the file's zero.
         fault: Why it cannot be used; an empty string if it can.
     """
 
@@ -71,6 +72,7 @@ class Thing:
     width_m: float | None = None
     is_part: bool = False
     facade: Mapping[str, float] = field(default_factory=dict)
+    has_z: bool = False
     fault: str = ""
 
     @property
@@ -316,7 +318,12 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
     own = _own_kind(tags, has_layers)
     name_keys = ("title", *_NAME_KEYS) if own in _OWN_STRUCTURES else _NAME_KEYS
     is_building = role is Role.BUILDING
-    top_m, base_m = reader.heights_m(feature) if is_building else (None, 0.0)
+    top_m, base_m = None, 0.0
+    if is_building and feature.extent_m is not None:
+        base_m, top_m = feature.extent_m
+    elif is_building:
+        top_m, base_m = reader.heights_m(feature)
+    part_of = feature.part_of or whole
     tnt_kg = length_m(tags["tnt_kg"]) if "tnt_kg" in tags else None
     if "tnt_kg" in tags and role is Role.CHARGE and not tnt_kg:
         kind, detail = "masses that cannot be read, --tnt-kg", value_text(tags["tnt_kg"])
@@ -330,12 +337,13 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         base_m=base_m,
         diameter_m=_diameter_m(feature, reader.unit_m) if is_building else None,
         protected=own == "protected_structure" or _word(tags, "protected") in _YES,
-        part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else whole,
+        part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else part_of,
         carries=own == "terrace" or _word(tags, "carries") in _YES,
         tnt_kg=tnt_kg or None,
         kind=_kind(tags, own) if is_building else own,
         width_m=_width_m(feature, reader) if role is Role.CHARGE else None,
         facade=feature.facade,
+        has_z=feature.extent_m is not None,
         is_part=_is_part(tags),
         fault=_fault(feature, role, has_layers),
     )

@@ -1,0 +1,110 @@
+"""Building models: each case is one form in which real models have a building."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing.ledger import FATES, Fate
+
+pytest.importorskip("ifcopenshell")
+
+CASES = Path(__file__).parent / "cases"
+
+
+def case(name: str, **options: Any) -> ImportedSite:
+    asked = {"protect": ("Court",), "charge_at": ((-6.0, 3.0),)}
+    return import_site(CASES / f"i_{name}.ifc", ImportOptions(**asked | options))
+
+
+def boxes(site: ImportedSite) -> list[tuple[float, float, float | None]]:
+    """Return area, underside and height of the buildings, the largest first."""
+    found = [(round(each.outline.area, 1), each.base_m, each.height_m) for each in site.buildings]
+    return sorted(found, reverse=True)
+
+
+def pane_m(site: ImportedSite) -> tuple[float, float, float]:
+    (window,) = site.scenario.components.values()
+    assert window.kind == "glazing"
+    return window.width_m, window.height_m, window.sill_m
+
+
+def said(site: ImportedSite, fate: Fate, words: str) -> list[str]:
+    """Return the details of the lines of the ledger whose kind has these words."""
+    return [each.detail for each in site.ledger.of(fate) if words in each.kind]
+
+
+def test_a_tower_on_a_podium_has_two_heights() -> None:
+    site = case("tower_podium")
+    assert boxes(site) == [(400.0, 0.0, 6.0), (200.0, 0.0, 60.0)]
+    assert all(each.protected for each in site.buildings)
+    assert sum(each.weight for each in site.scenario.structures) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_heights_count_from_the_lowest_storey_where_a_model_stands_above_the_sea() -> None:
+    site = case("absolute_storeys")
+    assert boxes(site) == [(200.0, 0.0, 12.0)]
+    assert said(site, Fate.GUESSED, "ground under buildings") == ["at 431 m, its lowest storey"]
+    with pytest.raises(BlastEnvError, match="at 431 m, its lowest storey"):
+        case("absolute_storeys", strict=True)
+
+
+def test_the_ground_of_every_building_of_a_model_is_said() -> None:
+    site = case("two_and_site_wall")
+    assert said(site, Fate.NOTED, "ground under buildings") == ["at 0 m, where it is placed"] * 2
+
+
+def test_paving_is_no_building() -> None:
+    site = case("paving")
+    assert boxes(site) == [(200.0, 0.0, 12.0)]
+    (slab,) = site.ledger.of(Fate.LEFT_OUT)
+    assert slab.kind == "IfcSlab lower than a storey"
+
+
+def test_a_wall_of_the_site_stands() -> None:
+    site = case("two_and_site_wall")
+    assert boxes(site) == [(200.0, 0.0, 12.0), (200.0, 0.0, 12.0), (6.0, 0.0, 9.0)]
+    assert {each.title for each in site.buildings} == {"Court", "B1", "IfcWall"}
+
+
+def test_windows_are_those_of_outer_walls() -> None:
+    site = case("inner_windows")
+    assert pane_m(site) == (2.4, 1.8, 1.0)
+    (detail,) = said(site, Fate.NOTED, "outer windows")
+    assert detail.startswith("8 with 34.6 m2 of glass")
+    assert len(said(site, Fate.MERGED, "windows of inner walls")) == 12
+
+
+def test_a_window_without_a_depth_has_its_size() -> None:
+    assert pane_m(case("flat_window")) == (1.2, 1.5, 1.0)
+
+
+def test_levels_between_floors_are_no_storeys() -> None:
+    site = case("helper_levels")
+    (court,) = site.scenario.structures
+    assert court.facade is not None
+    assert court.facade.storeys == 4
+    assert pane_m(site) == (1.2, 1.5, 1.0)
+
+
+def test_the_glass_of_a_curtain_wall_is_said() -> None:
+    site = case("curtain")
+    assert boxes(site) == [(200.0, 0.0, 12.0)]
+    assert said(site, Fate.GUESSED, "glass of curtain walls") == ["16.00 x 8.00 m"]
+
+
+def test_the_north_of_a_model_is_said() -> None:
+    words = "30.0 degrees clockwise from its y axis"
+    assert said(case("true_north"), Fate.NOTED, "north of the model") == [words]
+
+
+@pytest.mark.parametrize("name", sorted(each.stem[2:] for each in CASES.glob("i_*.ifc")))
+def test_every_element_of_a_model_has_one_fate(name: str) -> None:
+    import ifcopenshell
+
+    model = ifcopenshell.open(str(CASES / f"i_{name}.ifc"))
+    objects = [*model.by_type("IfcElement"), *model.by_type("IfcBuilding")]
+    places = sorted(each.place for each in case(name).ledger.of(*FATES))
+    assert places == sorted(f"{each.is_a()} {each.GlobalId}" for each in objects)
