@@ -24,24 +24,24 @@ _UNSEEN_SHARE: Final = 1.0 / 32.0
 
 
 class Store:
-    """Contents by their keys: everything on which a content depends, as text.
+    """Entries by their keys: everything on which an entry depends, as text.
 
-    The file is an SQLite database with a write-ahead log: after a crash or on a full device, a
-    content is either whole or absent. A content whose checksum differs is deleted and counts as
-    absent. A loss of power may lose the last contents. Processes on one machine may share a file;
+    The file is an SQLite database with a write-ahead log: after a crash or on a full device, an
+    entry is either whole or absent. An entry whose checksum differs is deleted and counts as
+    absent. A loss of power may lose the last entries. Processes on one machine may share a file;
     network folders have no such locks.
 
     A store can be pickled; the copy uses the same file.
 
     Args:
         path: The file; it and its folder are made if need be.
-        most_bytes: Largest total size of the contents; the oldest are deleted first. Each process
+        most_bytes: Largest total size of the entries; the oldest are deleted first. Each process
             checks it whenever it has written a 32nd part of it. Without it, nothing is deleted.
 
     Attributes:
         path: The file, as an absolute path.
         most_bytes: As given.
-        damaged: Number of damaged contents that this object has found.
+        damaged: Number of damaged entries that this object has found.
 
     Raises:
         BlastEnvError: If the file is damaged, is no store or cannot be opened, or `most_bytes` is
@@ -79,7 +79,7 @@ class Store:
             self._connection.close()
 
     def get(self, key: str) -> bytes | None:
-        """Return the content of a key, or `None` if it is absent or damaged.
+        """Return the entry of a key, or `None` if it is absent or damaged.
 
         Raises:
             BlastEnvError: If the file cannot be read.
@@ -98,8 +98,8 @@ class Store:
 
         Args:
             key: The key.
-            decode: Decodes the content. It raises `ValueError` for content that passes the
-                checksum but is not valid; such content counts as damaged.
+            decode: Decodes the entry. It raises `ValueError` for an entry that passes the
+                checksum but is not valid; such an entry counts as damaged.
 
         Raises:
             BlastEnvError: If the file cannot be read.
@@ -112,7 +112,7 @@ class Store:
             return None
 
     def put(self, key: str, content: bytes) -> None:
-        """Store the content of a key; the oldest ones may be deleted for it.
+        """Store the entry of a key; the oldest ones may be deleted for it.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -127,7 +127,7 @@ class Store:
             self._tidy_up(self.most_bytes)
 
     def items(self) -> Iterator[tuple[str, bytes]]:
-        """Yield keys and contents in the order of the keys, without damaged ones.
+        """Yield keys and entries in the order of the keys, without damaged ones.
 
         Raises:
             BlastEnvError: If the file cannot be read.
@@ -138,7 +138,7 @@ class Store:
                 yield key, content
 
     def discard(self, key: str) -> None:
-        """Count the content of a key as damaged, and delete it."""
+        """Count the entry of a key as damaged, and delete it."""
         self.damaged += 1
         self._run("DELETE FROM contents WHERE key = ?", key)
 
@@ -147,7 +147,7 @@ class Store:
         return count
 
     def _tidy_up(self, most_bytes: int) -> None:
-        """Delete the oldest contents, if all together exceed the bound."""
+        """Delete the oldest entries, if all together exceed the bound."""
         (size,) = self._run("SELECT TOTAL(LENGTH(content)) FROM contents")[0]
         if size > most_bytes:
             self._run(

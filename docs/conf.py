@@ -57,16 +57,11 @@ napoleon_use_ivar = True
 PUBLIC: Final = (
     "blast_env",
     "blast_env.evaluation",
-    "blast_env.site",
-    "blast_env.sites",
-    "blast_env.io.importing",
     "blast_env.calibration",
-    "blast_env.io.export",
+    "blast_env.io.importing",
     "blast_env.report",
     "blast_env.benchmark",
-    "blast_env.benchmark.data",
     "blast_agents.training",
-    "blast_env.design.search",
 )
 """Packages whose `__all__` is documented; a name of several of them, with the first."""
 

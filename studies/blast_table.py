@@ -52,7 +52,7 @@ COLUMNS: Final = (
     Column("engine", "", "engine with its version and fields", True),
     Column("structure", "", "name of the structure", True),
     Column("protected", "", "whether its load counts"),
-    Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
+    Column("impulse_pa_s", "Pa s", "mean impulse on the assessed walls"),
     Column("peak_pa", "Pa", "largest overpressure on them; missing for particles"),
 )
 """One row per structure and blast."""

@@ -1,6 +1,6 @@
 """Properties of generated sites, and a check by blasts of the criterion that selects them.
 
-The criterion uses lines of sight. Here every site is measured with blasts: of particles, or of gas
+The criterion uses lines of sight. Here every site is measured with blasts: by particles, or by gas
 dynamics for sites with heights and catalogues. With rejected sites included, all sites that a seed
 draws are measured, so that wrong rejections show.
 """
@@ -117,7 +117,7 @@ def measured(
     Args:
         site: The site.
         random_layouts: Number of random layouts.
-        threats: Number of charges, or seeds of particles, per layout.
+        threats: Number of charges, or seeds for particles, per layout.
         engine: Runs the blasts.
         criterion: Accepts or rejects the site; `VisibilityCriterion` by default.
     """

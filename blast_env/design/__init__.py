@@ -1,4 +1,4 @@
-"""The choice of a layout: rules, optimisers, and the surrogate of the gas engine."""
+"""The choice of a layout: rules and optimisers."""
 
 from blast_env.design.bollards import line_of_posts, posts_and_wall
 from blast_env.design.rules import (

@@ -1,4 +1,4 @@
-"""The workbook of a blast of particles."""
+"""The workbook of a blast by particles."""
 
 from pathlib import Path
 from typing import Final

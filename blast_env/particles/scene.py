@@ -20,7 +20,7 @@ from blast_env.units import UNITS_PER_M, in_units
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene(BlastSite):
-    """The initial state of one blast of particles; the balls are in simulation units.
+    """The initial state of one blast by particles; the balls are in simulation units.
 
     Attributes:
         balls: All balls; air first, then the charge.
@@ -71,7 +71,7 @@ def build_scene(
     seed: int = 0,
     charge: AnyCharge | None = None,
 ) -> Scene:
-    """Return the scene of one blast of particles, which is two-dimensional.
+    """Return the scene of one blast by particles, which is two-dimensional.
 
     Args:
         scenario: The scenario.

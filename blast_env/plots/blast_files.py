@@ -93,7 +93,7 @@ class BlastFiles:
     def draw(self, results: Sequence[Any]) -> list[Path]:
         """Draw the pictures of the results of `run`; return their files.
 
-        Pictures of gas dynamics have two blasts side by side. Those of particles go into files of
+        Pictures of gas dynamics have two blasts side by side. Those by particles go into files of
         their own, that of the first blast with `_without` at the end of its name.
         """
         every = (self.heat_map, self.history)

@@ -182,7 +182,7 @@ def _percent(share: float) -> str:
 
 
 def _with_error(share: float, error: float) -> str:
-    """Return a reduction with its error of the cells, if there is one."""
+    """Return a reduction with its grid error, if there is one."""
     if isnan(error):
         return _percent(share)
     return f"{percent(share)} \N{PLUS-MINUS SIGN} {points(error)} (cells)"

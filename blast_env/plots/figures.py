@@ -1,4 +1,4 @@
-"""Figures of one blast of particles, and files of figures."""
+"""Figures of one blast by particles, and files of figures."""
 
 from io import BytesIO
 from pathlib import Path

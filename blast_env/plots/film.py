@@ -53,7 +53,7 @@ def write_film(
 ) -> tuple[Any, ...]:
     """Run a blast, or two side by side, and write a film.
 
-    A film of particles shows the balls and the loads on modules. It ends a little after 99.9 % of
+    A film by particles shows the balls and the loads on modules. It ends a little after 99.9 % of
     the impulse on the protected structures has arrived (on all structures, if none is protected or
     hit), but at the latest at twice the arrival time of 95 %. A film of gas dynamics shows the
     overpressure in plan and in a section, to the end of the run. Two blasts are shown at the same
@@ -120,7 +120,7 @@ def _with_progress(
 def _particle_footage(
     blasts: Sequence[Blast], width_px: int, progress: ProgressCallback
 ) -> Footage:
-    """Run blasts of particles for their loads and arrival times; frames run them again.
+    """Run blasts by particles for their loads and arrival times; frames run them again.
 
     Each blast gets an equal part of the width, rounded down to an even one.
     """

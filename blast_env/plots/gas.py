@@ -266,7 +266,7 @@ class _Walled:
         parts: Names of the structures.
         rectangle_m: The rectangle around them.
         height_m: The height of the highest.
-        faces: The walls that count for at least one of them.
+        faces: The assessed walls for at least one of them.
     """
 
     name: str

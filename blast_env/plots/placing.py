@@ -118,7 +118,7 @@ def sources_text(sources: Sequence[AnySource]) -> str:
 
 
 def _frames_of_blast(scenario: Scenario, width_px: int) -> FramePainter | None:
-    """Return the painter of a blast of particles; `None` if they cannot run the scenario."""
+    """Return the painter of a blast by particles; `None` if they cannot run the scenario."""
     try:
         return FramePainter(_fullest_blast(scenario), width_px=width_px)
     except BlastEnvError:

@@ -637,7 +637,7 @@ def _places_of(source: AnySource, number: int, count: int) -> Iterator[Feature]:
 def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tuple[Feature, ...]:
     """Return the ground that vehicles reach, their worst places and ways, and the stand-offs.
 
-    A stand-off is a line from a vehicle's worst place to the nearest wall that counts, with its
+    A stand-off is a line from a vehicle's worst place to the nearest assessed wall, with its
     length in metres.
 
     Args:
@@ -660,7 +660,7 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
 
 
 def stand_off_feature(walls: Sequence[Wall], place_m: PointM) -> Feature:
-    """Return the line from a place to the nearest wall that counts, with its length in metres."""
+    """Return the line from a place to the nearest assessed wall, with its length in metres."""
     wall_m = nearest_point_m(walls, place_m)
     length = f"stand-off {np.hypot(*np.subtract(place_m, wall_m)):.1f} m"
     return Feature(Kinds.STAND_OFF, (place_m, wall_m), "stand-off", label=length)

@@ -37,7 +37,7 @@ _EVERY_S: Final = 0.0002  # for 100 kg
 _LONGEST_S: Final = 4.0  # for 100 kg
 _CURVES: Final = (0.2, 30.0)  # scaled distances, m/kg^(1/3), of the curves of both bursts
 _LONGEST_WAY_M: Final = 100.0
-_SHOWN_SHARE: Final = 0.9  # of the walls that count, on the scale
+_SHOWN_SHARE: Final = 0.9  # of the assessed walls, on the scale
 _NARROWEST_PX, _WIDEST_PX = 480, 4096
 _WIDTH_PX: Final = 960  # of a blast in progress
 PLAN_HEIGHT_M: Final = 1.5
@@ -117,7 +117,7 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
 
 
 def scale_end_kpa(results: Sequence[GasResult]) -> float:
-    """Return the end of the scale, kPa: nine tenths of the walls that count peak below it.
+    """Return the end of the scale, kPa: nine tenths of the assessed walls peak below it.
 
     Close to a charge the peaks of a few cells are a hundred times those of the rest.
     """
@@ -126,7 +126,7 @@ def scale_end_kpa(results: Sequence[GasResult]) -> float:
 
 
 def _counting_peaks_pa(result: GasResult) -> FloatArray:
-    """Return the peaks on the cells of walls that count, of each structure if none is protected."""
+    """Return the peaks on the cells of assessed walls, of each structure if none is protected."""
     faces = result.on_walls
     counts = [
         (faces["structure"] == each.name) & faces["face"].isin(each.faces)

@@ -56,7 +56,7 @@ class Scenario(Content):
         structures: Structures, protected or not.
         build_zone: The zone for barriers; without one, there are none.
         simulation: Parameters of the particle model.
-        calibration: Name of the calibration that converts impulses of particles to Pa s.
+        calibration: Name of the calibration that converts impulses by particles to Pa s.
         gauges: Gauges of overpressure, for the engine `gas`.
         objective: The objective of layouts.
         georeference: Place of the site on a map or drawing; no result depends on it.

@@ -34,7 +34,7 @@ COLUMNS: Final = (
     Column("tnt_kg", "kg", "its mass"),
     Column("structure", "", "name of the structure", True),
     Column("protected", "", "whether its load counts"),
-    Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
+    Column("impulse_pa_s", "Pa s", "mean impulse on the assessed walls"),
     Column("peak_pa", "Pa", "largest overpressure on them"),
     Column("unprotected_impulse_pa_s", "Pa s", "the same blast without a barrier; else missing"),
     Column("unprotected_peak_pa", "Pa", "the same for the overpressure"),

@@ -123,7 +123,7 @@ class AdviceJudge:
         return found if self.shares[layout] >= wanted else min(found, Verdict.PASSES_BARELY)
 
     def error(self, layout: Layout) -> GridError | None:
-        """Return the error of the cells for a judged layout.
+        """Return the grid error for a judged layout.
 
         The search's blasts serve it if their cells are twice as large as the judge's.
         """
@@ -154,7 +154,7 @@ class AdviceResult:
         return best_of(self.found, self.judge.verdict)
 
     def answer(self) -> Iterator[AnswerPart]:
-        """Yield the cost to pass, flags, the error of the cells, and the table of the kinds."""
+        """Yield the cost to pass, flags, the grid error, and the table of the kinds."""
         judge, best = self.judge, self.best
         scenario, target = judge.scenario, judge.target
         yield self._first_line(best)

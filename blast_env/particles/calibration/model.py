@@ -1,6 +1,6 @@
 """Calibrations, from simulated impulse to impulse per area, stored with all their dependencies.
 
-The module also has the unit for displaying the loads of a blast of particles.
+The module also has the unit for displaying the loads of a blast by particles.
 """
 
 import json
@@ -365,7 +365,7 @@ LOAD_LABEL: Final = "impulse per module (simulation units)"
 
 @dataclass(frozen=True)
 class LoadUnit:
-    """Unit for displaying the loads of a blast of particles: Pa s with a calibration.
+    """Unit for displaying the loads of a blast by particles: Pa s with a calibration.
 
     A calibration converts the load on a whole structure. A module's load is its share of that by
     m|v| per metre of facade, with the factor of the protected structure of the largest load.
