@@ -11,6 +11,7 @@ RUN apt-get update \
 
 WORKDIR /src
 COPY pyproject.toml hatch_build.py constraints.txt README.md LICENSE ./
+COPY blast_env_command.py ./
 COPY blast_env blast_env
 COPY agents agents
 COPY scenarios scenarios

@@ -1,5 +1,5 @@
 """`python -m blast_env`: the command line, where `blast-env` is not on the path."""
 
-from blast_env.cli import app
+from blast_env_command import main
 
-app(prog_name="blast-env")
+main()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import typer
 
 from blast_env.cli.command import PICTURES, writes
+from blast_env.cli.interruptions import Interruptions
 from blast_env.cli.options import GlazingOption, WallOption, numbers
 from blast_env.cli.output import (
     print_json,
@@ -140,7 +141,8 @@ def import_map(
     the deviation of the modules of each building from its outline.
     """
     # Here, because maps need the extra `maps`.
-    from blast_env.io.importing import import_site
+    with Interruptions.current().at_once():
+        from blast_env.io.importing import import_site
 
     imported = import_site(file, _options(context))
     imported = replace(imported, scenario=imported.scenario.with_facades(glazing, wall))

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from signal import SIG_DFL, SIGINT, SIGTERM, getsignal, signal
-from threading import current_thread, main_thread
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -20,12 +18,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from blast_env.cli.interruptions import Interruptions
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.gas.cost import CostGuess, cost_words
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import printable, printable_line
+from blast_env_command import NOTHING_HALF_WRITTEN
 
 if TYPE_CHECKING:  # a third of a second to import
     from matplotlib.figure import Figure
@@ -34,10 +34,7 @@ if TYPE_CHECKING:  # a third of a second to import
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
-_EXIT_OF_SIGNALS: Final = 128  # of shells; the number of the signal is added
 _BETWEEN: Final = 2  # characters between columns
-
-NOTHING_HALF_WRITTEN: Final = "no file was left half-written"
 
 LAYOUT_NAME: Final = "layout.json"
 """File of the layout in the folder of `--out`."""
@@ -83,23 +80,32 @@ class InterruptedCommandError(Exception):
 def user_errors() -> Iterator[None]:
     """Turn errors of the user into a message and exit code 2, interruptions into 130 or 143.
 
-    SIGTERM (`timeout`, a batch system, a shutdown) ends the block as Ctrl-C does.
+    SIGTERM ends the block as Ctrl-C does. An error that follows an interruption is a consequence of
+    it, as when a library reports a missing worker.
     """
-    with _sigterm_as_interrupt() as terminated:
-        try:
+    interruptions = Interruptions.current()
+    try:
+        with interruptions.raised():
             yield
-        except KeyboardInterrupt:
-            parts: tuple[str, ...] = (NOTHING_HALF_WRITTEN,)
-        except InterruptedCommandError as interrupted:
-            parts = interrupted.parts
-        except BlastEnvError as error:
+    except KeyboardInterrupt:
+        parts: tuple[str, ...] = (NOTHING_HALF_WRITTEN,)
+    except InterruptedCommandError as interrupted:
+        parts = interrupted.parts
+    except Exception as error:
+        if not interruptions.received:
+            if not isinstance(error, BlastEnvError):
+                raise
             message_console().print(printable(f"error: {error}"), style="red")
+            interruptions.settle(is_told=True)
             raise typer.Exit(2) from error
-        else:
-            return
+        parts = (NOTHING_HALF_WRITTEN,)
+    else:
+        interruptions.settle(is_told=False)
+        return
     text = "; ".join(part for part in parts if part)
     message_console().print(printable(f"interrupted: {text}"), style="yellow")
-    raise typer.Exit(_EXIT_OF_SIGNALS + (SIGTERM if terminated else SIGINT))
+    interruptions.settle(is_told=True)
+    raise typer.Exit(interruptions.exit_code)
 
 
 @contextmanager
@@ -110,29 +116,6 @@ def resumable(words: str | Callable[[], str]) -> Iterator[None]:
     except KeyboardInterrupt as interruption:
         resume = words if isinstance(words, str) else words()
         raise InterruptedCommandError(NOTHING_HALF_WRITTEN, resume) from interruption
-
-
-@contextmanager
-def _sigterm_as_interrupt() -> Iterator[list[int]]:
-    """Raise `KeyboardInterrupt` on SIGTERM; yield a list that then holds the signal.
-
-    Nothing changes in threads other than the main one, or if SIGTERM has no default handler, as
-    when the parent ignores it.
-    """
-    received: list[int] = []
-    if current_thread() is not main_thread() or getsignal(SIGTERM) is not SIG_DFL:
-        yield received
-        return
-
-    def interrupt(number: int, _frame: object) -> None:
-        received.append(number)
-        raise KeyboardInterrupt
-
-    signal(SIGTERM, interrupt)
-    try:
-        yield received
-    finally:
-        signal(SIGTERM, SIG_DFL)
 
 
 def print_json(content: Mapping[str, object]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from blast_env.cli.command import writes
+from blast_env.cli.interruptions import Interruptions
 from blast_env.cli.options import (
     BY_SITE,
     ENGINE_HELP,
@@ -99,10 +100,15 @@ def train(
     folder = resume or run
     if folder is None:
         raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
+    if resume is not None:
+        fixed = {each.name or "" for each in context.command.params} - {*_WITH_RESUME}
+        refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
+    # Here, because torch takes seconds to start, and is an extra; not below, because before it
+    # there is nothing to resume.
+    with import_extra("agents,render", "training"), Interruptions.current().at_once():
+        import blast_agents.training  # noqa: F401
     with running_on(cluster), resumable(partial(_how_to_resume, folder)):
         if resume is not None:
-            fixed = {each.name or "" for each in context.command.params} - {*_WITH_RESUME}
-            refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
             result = _go_on(resume, scenario)
         else:
             values = {name: context.params[name] for name in _SETTINGS}
@@ -123,7 +129,6 @@ def train(
 
 def _how_to_resume(folder: Path) -> str:
     """Return the way to resume an interrupted training."""
-    # Here, because torch takes seconds to start, and is an extra.
     from blast_agents.training.run_folder import RunFolder
 
     if RunFolder(folder).is_run:
@@ -132,9 +137,7 @@ def _how_to_resume(folder: Path) -> str:
 
 
 def _go_on(folder: Path, scenario: str | None) -> "TrainingResult":
-    # Here, because torch takes seconds to start, and is an extra.
-    with import_extra("agents,render", "training"):
-        from blast_agents.training import resume
+    from blast_agents.training import resume
 
     with progress_bar(f"training {folder}") as progress:
         return resume(folder, scenario, progress)
@@ -149,11 +152,9 @@ def _train(
     envs: int | None,
 ) -> "TrainingResult":
     """Train in a new run folder, with settings and changes other than the defaults."""
-    # Here, because torch takes seconds to start, and is an extra.
-    with import_extra("agents,render", "training"):
-        from blast_agents.training import load_hyperparameters, train
-        from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-        from blast_agents.training.run_folder import SETTING_KEYS, environment_id, settings_from
+    from blast_agents.training import load_hyperparameters, train
+    from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
+    from blast_agents.training.run_folder import SETTING_KEYS, environment_id, settings_from
 
     changes = parse_options(set_to, [*hyperparameter_keys(), *SETTING_KEYS])
     if given.get("observation") in _POLICIES:
