@@ -29,6 +29,7 @@ from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ReductionReward, Transition
 from blast_env.evaluation import (
+    Assessment,
     Evaluation,
     Evaluators,
     LoadCaseSet,
@@ -117,9 +118,15 @@ class CorrectedReward:
         """Return `reduction`."""
         return ("reduction",)
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
+    def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
+        """Return none: those at the end are enough."""
+        return ()
+
+    def __call__(
+        self, transition: Transition, loads: Mapping[Layout, Assessment]
+    ) -> Mapping[str, float]:
         """Return the term `reduction`, 0 before the end."""
-        guessed = ReductionReward()(transition)["reduction"]
+        guessed = ReductionReward()(transition, loads)["reduction"]
         if not transition.ended:
             return {"reduction": 0.0}
         return {"reduction": self.corrected(transition.after, guessed)}

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.geometry import Element
 from blast_env.site import AnySource, Catalogue, Scenario
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
@@ -201,12 +200,33 @@ class NumberedActions:
 
     def with_sources(self, sources: tuple[AnySource, ...]) -> "NumberedActions":
         """Return the actions for other places of the charge, as shown to the agent."""
-        return NumberedActions(self.scenario, sources, self.choices, self.first, self.finish)
+        other = NumberedActions(self.scenario, sources, self.choices, self.first, self.finish)
+        vars(other)["are_plain"] = self.are_plain
+        if not self.are_plain:
+            vars(other)["_places"] = self._places
+        return other
 
     @property
     def catalogue(self) -> Catalogue:
         """The catalogue of modules or pieces."""
         return self.scenario.zone.catalogue
+
+    @cached_property
+    def are_plain(self) -> bool:
+        """Whether each action is a placement, so that the legal places are the mask."""
+        first = self.choices[0].ravel()
+        return len(self.choices) == 1 and np.array_equal(first, np.arange(self.finish))
+
+    @cached_property
+    def _places(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """For each choice, the placements sorted by its option, and the first of each option."""
+        found = []
+        for options in self.choices:
+            flat = options.ravel()
+            places = np.argsort(flat, kind="stable")
+            firsts = np.searchsorted(flat[places], np.arange(int(flat.max(initial=-1)) + 2))
+            found.append((places, firsts))
+        return tuple(found)
 
     @cached_property
     def _beside_m(self) -> FloatArray:
@@ -219,12 +239,15 @@ class NumberedActions:
             chosen: The choices so far.
         """
         mask = np.zeros(self.finish + 1, dtype=np.bool_)
+        if self.are_plain:
+            mask[:-1], mask[-1] = chosen.possible.ravel(), True
+            return mask
         options = self.choices[chosen.choices]
         mask[self.first[chosen.choices] + options[chosen.possible]] = True
         mask[-1] = chosen.choices == 0
         return mask
 
-    def narrowed(self, chosen: ActionChoice, action: int) -> ActionChoice | Element | None:
+    def narrowed(self, chosen: ActionChoice, action: int) -> ActionChoice | int | None:
         """Return the state of choice after an action.
 
         Choices with a single remaining option are skipped.
@@ -234,12 +257,19 @@ class NumberedActions:
             action: An action other than the one that finishes.
 
         Returns:
-            The choices after it; the element to place, if all choices are made; or `None` if the
-            action is illegal.
+            The choices after it; the number in the catalogue of the element to place, if all
+            choices are made; or `None` if the action is illegal.
         """
-        option = action - self.first[chosen.choices]
-        possible = chosen.possible & (self.choices[chosen.choices] == option)
-        places = possible.ravel().nonzero()[0]
+        if self.are_plain:
+            return action if chosen.possible.item(action) else None
+        option, (sorted_places, firsts) = (
+            action - self.first[chosen.choices],
+            self._places[chosen.choices],
+        )
+        if not 0 <= option < len(firsts) - 1:
+            return None
+        own = sorted_places[firsts[option] : firsts[option + 1]]
+        places = own[chosen.possible.ravel()[own]]
         if not len(places):
             return None
         made = chosen.choices + 1
@@ -247,7 +277,9 @@ class NumberedActions:
             made += 1
         if made == len(self.choices):
             nearest = self._beside_m.flat[places].argmin() if len(places) > 1 else 0
-            return self.catalogue.element(int(places[nearest]))
+            return int(places[nearest])
+        possible = np.zeros_like(chosen.possible)
+        possible.flat[places] = True
         possible.flags.writeable = False
         options = tuple(int(each.flat[places[0]]) for each in self.choices[:made])
         return ActionChoice(possible, made, options)

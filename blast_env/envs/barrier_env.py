@@ -20,14 +20,14 @@ from blast_env.envs.display import Display
 from blast_env.envs.episode import (
     INVALID_ACTIONS,
     Episode,
+    Episodes,
     IllegalActions,
     Task,
     find_realisations,
     find_risk,
     find_threat_model,
-    total,
 )
-from blast_env.envs.observable import MASK, Observable, Observation
+from blast_env.envs.observable import MASK, Observable, Observation, one_of
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import (
     REWARDS,
@@ -38,7 +38,6 @@ from blast_env.envs.strategies import (
 )
 from blast_env.errors import value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
-from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
@@ -176,13 +175,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.reward_strategy = strategy("reward", reward, REWARDS)
         check_names("invalid_action", [invalid_action], INVALID_ACTIONS)
-        self.illegal = IllegalActions(
-            invalid_action == "nearest",
-            real_number("invalid_action_cost", invalid_action_cost, 0.0, 1e6),
-            whole_number("invalid_action_limit", invalid_action_limit, 1, 1_000_000),
-        )
         self.task = Task(
             source=source,
             threat_model=find_threat_model(threat, threats),
@@ -190,17 +183,24 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             risk=find_risk(risk, cvar_level),
             observation=strategy("observation", observation, OBSERVATIONS),
             actions=strategy("action", action, ACTIONS),
-            evaluators=Evaluators(found, cache),
+            reward=strategy("reward", reward, REWARDS),
+            illegal=IllegalActions(
+                invalid_action == "nearest",
+                real_number("invalid_action_cost", invalid_action_cost, 0.0, 1e6),
+                whole_number("invalid_action_limit", invalid_action_limit, 1, 1_000_000),
+            ),
+            engine=found,
+            store=BlastStore.of(cache),
         )
-        self.task.evaluators.of(representative)  # an unsuitable engine fails here, not later
+        self.task.evaluator(representative)  # an unsuitable engine fails here, not later
         numbered = NumberedActions.of(self.task.actions, representative)
         self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
         if isinstance(self.observation_space, spaces.Dict):
             mask = spaces.MultiBinary(numbered.finish + 1)
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
+        self.episodes = Episodes(self.task, 1)
         self._display = Display(render_mode, self.metadata["render_fps"])
-        self._begun: Episode | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -214,12 +214,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 from that of the representative one.
         """
         super().reset(seed=seed)
-        chosen = ResetOptions.from_mapping(options)
-        episode = self.task.start(self.np_random, chosen, self.reward_strategy)
-        self._begun = episode
+        self.episodes.begin(0, self.np_random, ResetOptions.from_mapping(options))
         if self.render_mode == "human":
-            self._display.show(episode)
-        return episode.observe(), episode.information()
+            self._display.show(self._episode, self.placement)
+        return self._observation(), self.episodes.information(0)
 
     def step(self, action: np.int64 | int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Make a choice, place a module or a piece, or finish; see the class.
@@ -228,17 +226,27 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             gymnasium.error.InvalidAction: If the action is not in the action space.
             gymnasium.error.ResetNeeded: If `reset` has not been called, or the episode has ended.
         """
+        self._check(action)
+        self.episodes.place(0, int(action))
+        self.episodes.blast([0])
+        observation = self._observation()
+        reward = self.episodes.reward(0)
+        terminated = self._episode.ended
+        info = self.episodes.information(0)
+        if self.render_mode == "human":
+            self._display.show(self._episode, self.placement)
+        return observation, reward, terminated, False, info
+
+    def _check(self, action: np.int64 | int) -> None:
         if not self.action_space.contains(action):
             raise gym.error.InvalidAction(
                 f"action is {value_text(action)}, must be in {self.action_space}"
             )
-        episode = self._episode
-        if episode.ended:
+        if self._episode.ended:
             raise gym.error.ResetNeeded("the episode has ended: call reset")
-        terms = episode.act(int(action), self.reward_strategy, self.illegal)
-        if self.render_mode == "human":
-            self._display.show(episode)
-        return episode.observe(), total(terms), episode.ended, False, episode.information()
+
+    def _observation(self) -> Any:
+        return one_of(self.episodes.observe([0], self.observation_space), 0)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (actions,).
@@ -246,7 +254,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
         """
-        return self._episode.action_mask()
+        self._episode  # noqa: B018  # refuses a call before `reset`
+        mask: NDArray[np.bool_] = self.episodes.masks([0])[0].astype(np.bool_)
+        return mask
 
     def explain(self, element: Element) -> str | None:
         """Return a sentence with the reason why an element cannot be placed, `None` if it can.
@@ -270,16 +280,19 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     @property
     def placement(self) -> LayoutState:
         """The modules or pieces placed so far."""
-        return self._episode.placement
+        self._episode  # noqa: B018  # refuses a call before `reset`
+        return self.episodes.layouts.state(0)
 
     @property
     def observable(self) -> Observable:
         """The observable part of the episode before the charge goes off."""
-        return self._episode.observable
+        return self._episode.shown.observable
 
     def render(self) -> Any:
         """Return a frame (`"rgb_array"`) or text (`"ansi"`), or show a frame (`"human"`)."""
-        return None if self._begun is None else self._display.render(self._begun)
+        if not self.episodes.running:
+            return None
+        return self._display.render(self._episode, self.placement)
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -287,6 +300,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
 
     @property
     def _episode(self) -> Episode:
-        if self._begun is None:
+        if not self.episodes.running:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
-        return self._begun
+        return self.episodes.running[0]

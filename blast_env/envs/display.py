@@ -112,20 +112,21 @@ class Display:
         self._last_frame: Frame | None = None
         self._window: Window | None = None
 
-    def show(self, episode: Episode) -> None:
+    def show(self, episode: Episode, placement: LayoutState) -> None:
         """Show the present state in the window, long enough for a person to follow."""
         for _ in range(1 if episode.ended else _FRAMES_PER_PLACEMENT):
-            self._show(self._frame(episode))
+            self._show(self._frame(episode, placement))
 
-    def render(self, episode: Episode) -> Frame | str | None:
+    def render(self, episode: Episode, placement: LayoutState) -> Frame | str | None:
         """Return the frame or text of the render mode; `"human"` shows a frame instead."""
         if self._render_mode == "rgb_array":
-            return self._frame(episode).copy()
+            return self._frame(episode, placement).copy()
         if self._render_mode == "ansi":
-            lines = [*_state_lines(episode), *([_outcome(episode)] if episode.ended else [])]
-            return placing_text(episode.placement, episode.observable.sources, lines)
+            lines = _state_lines(episode, placement)
+            lines += [_outcome(episode)] if episode.ended else []
+            return placing_text(placement, episode.shown.observable.sources, lines)
         if self._render_mode == "human":
-            self._show(self._frame(episode))
+            self._show(self._frame(episode, placement))
         return None
 
     def close(self) -> None:
@@ -138,17 +139,13 @@ class Display:
         """Return the state without drawing objects, which do not pickle."""
         return {**self.__dict__, "_painter": None, "_window": None}
 
-    def _frame(self, episode: Episode) -> Frame:
+    def _frame(self, episode: Episode, placement: LayoutState) -> Frame:
         """Return the present frame."""
-        return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
-
-    def _placing_frame(self, episode: Episode) -> Frame:
-        return self._placing_painter(episode).paint(episode.placement, _state_lines(episode))
-
-    def _final_frame(self, episode: Episode) -> Frame:
-        painter = self._placing_painter(episode)
-        if episode.problem.evaluator.engine.medium != "particles":  # no state that stays
-            return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
+        painter, lines = self._placing_painter(episode), _state_lines(episode, placement)
+        if not episode.ended:
+            return painter.paint(placement, lines)
+        if episode.evaluator.engine.medium != "particles":  # no state that stays
+            return painter.paint(placement, [*lines[:1], _outcome(episode)])
         if self._last_frame is None:
             self._last_frame = _last_frame(episode, painter.size_px)
         return self._last_frame
@@ -160,7 +157,7 @@ class Display:
         if self._painter is None or self._episode is not episode:
             if self._episode is not episode:
                 self._last_frame = None
-            observable = episode.observable
+            observable = episode.shown.observable
             self._painter = PlacingPainter(observable.scenario, observable.sources)
             self._episode = episode
         return self._painter
@@ -177,10 +174,10 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
     """Return the end of the blast of the worst threat, which runs again for the picture."""
     from blast_env.plots.placing import last_frame
 
-    shown, evaluator = _shown_threat(episode), episode.problem.evaluator
+    shown, evaluator = _shown_threat(episode), episode.evaluator
     # Sorted as for the assessment: the order may change the last bits.
-    layout = tuple(sorted(episode.placement.layout))
-    charges = len(episode.problem.case.charges)
+    layout = tuple(sorted(episode.transition.after))
+    charges = len(episode.case.charges)
     remark = f": the worst of {charges} charges" if charges > 1 else ""
     blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
     assert isinstance(blast, Blast)
@@ -189,8 +186,8 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
 
 def _shown_threat(episode: Episode) -> LoadCase:
     """Return the worst threat, with its first realisation."""
-    case = episode.problem.case
-    blasts = episode.problem.loads_with(episode.placement.layout)
+    case, layout = episode.case, episode.transition.after
+    blasts = episode.evaluator.loads_of_many([(layout, threat) for threat in case.threats])
     loads = np.array([each.load(case.scenario.objective) for each in blasts])
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
@@ -200,24 +197,24 @@ def _outcome(episode: Episode) -> str:
     """Return the loads and the reduction, in words."""
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
-    of_all = "all charges: " if len(episode.problem.case.charges) > 1 else ""
+    of_all = "all charges: " if len(episode.case.charges) > 1 else ""
     load = f"{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s)"
-    counts = episode.problem.case.scenario.objective
+    counts = episode.case.scenario.objective
     if counts.needs_peaks:
         load = f"{load}, {counts.noun} {counts.text(protected.load)}"
     return f"{of_all}{load}, reduction {reduction_percent:.0f} %"
 
 
-def _state_lines(episode: Episode) -> list[str]:
+def _state_lines(episode: Episode, placement: LayoutState) -> list[str]:
     """Return the remaining stock and budget, the stand-off, and the count of illegal actions."""
-    placement, zone = episode.placement, episode.placement.scenario.zone
+    zone = placement.scenario.zone
     what = "pieces" if zone.items else "modules"
     lines = [f"{placement.stock_left} of {zone.stock} {what} left"]
     left = zip(placement.catalogue.names, placement.stocks_left, strict=False)
     extras = [f"{count} {name}" for name, count in left if count]
     if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
-    vehicles = VehicleView.of(placement.scenario, episode.observable.sources)
+    vehicles = VehicleView.of(placement.scenario, episode.shown.observable.sources)
     if vehicles.vehicles:
         extras.append(f"stand-off {vehicles.stand_off_m(placement.layout):.1f} m")
     if episode.invalid_actions:

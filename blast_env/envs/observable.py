@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
+from blast_env.layout.batch import Placements
 from blast_env.layout.build_site import vehicle_reach, worst_places
 from blast_env.site import (
     AnySource,
@@ -108,7 +109,7 @@ class BatchedObservation(ABC):
 
     @staticmethod
     @abstractmethod
-    def observe_many(episodes: Sequence[Any], placements: Sequence[LayoutState]) -> Any:
+    def observe_many(episodes: Sequence[Any], placements: Placements) -> Any:
         """Return the observations of episodes of this class, with a leading axis (episodes, ...).
 
         Args:
@@ -118,7 +119,7 @@ class BatchedObservation(ABC):
 
     def observe(self, placement: LayoutState) -> Any:
         """Return a new element of the space, for the modules placed so far."""
-        return one_of(self.observe_many([self], [placement]), 0)
+        return one_of(self.observe_many([self], Placements.of(placement)), 0)
 
 
 def one_of(observed: Any, index: int) -> Any:
@@ -159,18 +160,17 @@ def height_share(height_m: float | None) -> float:
     return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
 
 
-def stock_shares(placements: Sequence[LayoutState]) -> FloatArray:
+def stock_shares(placements: Placements) -> FloatArray:
     """Return the remaining stock and budget as values from 0 to 1 (placements, 3).
 
     They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
     and the share of the budget (1 without a budget).
     """
-    rows = []
-    for each in placements:
-        zone, left, budget_left = each.scenario.zone, each.stock_left, each.budget_left
-        of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
-        rows.append((left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget))
-    return np.array(rows)
+    left, zones = placements.left[:, 0], [each.zone for each in placements.rules]
+    budgets = np.array([np.nan if each.budget is None else each.budget for each in zones])
+    of_budget = np.where(np.isnan(budgets), 1.0, placements.budget_left / budgets)
+    stocks = np.array([each.stock for each in zones])
+    return np.stack((left / stocks, np.minimum(left / FULL_STOCK, 1.0), of_budget), axis=1)
 
 
 def cost_shares(scenario: Scenario) -> FloatArray:
@@ -179,15 +179,9 @@ def cost_shares(scenario: Scenario) -> FloatArray:
     return np.asarray(costs / costs.max())
 
 
-def cells_shown(placements: Sequence[LayoutState], legal: BoolArray) -> BoolArray:
-    """Return where modules stand and where some may be placed (placements, 2, rows, columns).
-
-    Args:
-        placements: The placements.
-        legal: `LayoutState.legal` of each (placements, variants, rows, columns).
-    """
-    occupied = np.array([each.standing for each in placements]) > 0
-    return np.stack((occupied, legal.any(axis=1)), axis=1)
+def cells_shown(placements: Placements) -> BoolArray:
+    """Return where modules stand and where some may be placed (placements, 2, rows, columns)."""
+    return np.stack((placements.standing > 0, placements.legal.any(axis=1)), axis=1)
 
 
 def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
@@ -203,31 +197,30 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
     return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
 
 
-def items_placed(placements: Sequence[LayoutState], legal: BoolArray) -> tuple[FloatArray, Plane]:
-    """Return the values of a catalogue that change with the layouts.
-
-    Args:
-        placements: The placements.
-        legal: As for `cells_shown`.
+def items_placed(placements: Placements) -> Plane:
+    """Return the values of the cells that change with the layouts of pieces.
 
     Returns:
-        The remaining share of the pieces of each item (placements, items); and for each cell the
-        height of its module, whether that stops vehicles, and whether a piece of each variant may
-        have its lower left cell there (placements, 2 + variants, rows, columns).
+        For each cell the height of its module, whether that stops vehicles, and whether a piece of
+        each variant may have its lower left cell there (placements, 2 + variants, rows, columns).
     """
+    legal = placements.legal
     on_cells = np.empty((len(legal), 2 + legal.shape[1], *legal.shape[2:]), dtype=np.float32)
     on_cells[:, 2:] = legal
-    tables: dict[int, Plane] = {}
-    for own, each in zip(on_cells, placements, strict=True):
-        if id(each.catalogue) not in tables:
-            rows = [(height_share(v.height_m), v.stops_vehicles) for v in each.catalogue.variants]
-            tables[id(each.catalogue)] = np.array([(0.0, 0.0), *rows], dtype=np.float32).T
-        np.take(tables[id(each.catalogue)], each.standing, axis=1, out=own[:2], mode="clip")
-    return items_left(placements), on_cells
+    of_catalogues: dict[int, list[int]] = {}
+    for index, each in enumerate(placements.rules):
+        of_catalogues.setdefault(id(each.catalogue), []).append(index)
+    for own in of_catalogues.values():
+        variants = placements.rules[own[0]].catalogue.variants
+        rows = [(height_share(each.height_m), each.stops_vehicles) for each in variants]
+        table = np.array([(0.0, 0.0), *rows], dtype=np.float32)
+        on_cells[own, :2] = np.moveaxis(table[placements.standing[own]], -1, 1)
+    return on_cells
 
 
-def items_left(placements: Sequence[LayoutState]) -> FloatArray:
+def items_left(placements: Placements) -> FloatArray:
     """Return the remaining share of the pieces of each item (placements, items)."""
-    stocks = np.array([each.catalogue.stocks for each in placements])
-    left: FloatArray = np.array([each.stocks_left for each in placements]) / np.maximum(stocks, 1)
-    return left
+    stocks = np.array([each.catalogue.stocks for each in placements.rules])
+    left = np.minimum(placements.left[:, 1:], placements.left[:, :1])
+    shares: FloatArray = left / np.maximum(stocks, 1)
+    return shares

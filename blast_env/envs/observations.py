@@ -29,8 +29,7 @@ from blast_env.envs.observable import (
 )
 from blast_env.envs.planes import GridObservation, ImageEpisode, ImageObservation
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout
-from blast_env.layout import LayoutState
+from blast_env.layout.batch import Placements
 from blast_env.site import (
     AnySource,
     Scenario,
@@ -130,30 +129,39 @@ class FeaturesEpisode(BatchedObservation):
     shows_vehicles: bool
 
     @staticmethod
-    def observe_many(
-        episodes: Sequence["FeaturesEpisode"], placements: Sequence[LayoutState]
-    ) -> Array:
+    def observe_many(episodes: Sequence["FeaturesEpisode"], placements: Placements) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
-        legal = np.array([each.legal for each in placements])
-        parts: list[NDArray[Any]] = [
-            stock_shares(placements),
-            np.array([each.site for each in episodes]),
-        ]
-        parts += [cells_shown(placements, legal), np.array([each.costs for each in episodes])]
-        parts.append(np.array([each.items for each in episodes]))
-        if placements[0].catalogue.has_items:
-            parts += items_placed(placements, legal)
+        parts: list[NDArray[Any]] = [stock_shares(placements)]
+        parts.append(_of_each(episodes, [each.site for each in episodes]))
+        parts.append(cells_shown(placements))
+        parts.append(_of_each(episodes, [each.costs for each in episodes]))
+        parts.append(_of_each(episodes, [each.items for each in episodes]))
+        if placements.rules[0].catalogue.has_items:
+            parts += [items_left(placements), items_placed(placements)]
         if episodes[0].shows_vehicles:
-            pairs = zip(episodes, placements, strict=True)
-            parts.append(np.stack([_stand_off(each.vehicles, own.layout) for each, own in pairs]))
+            parts.append(_stand_offs([each.vehicles for each in episodes], placements))
         return _joined(parts)
+
+
+def _of_each(episodes: Sequence[object], values: Sequence[FloatArray]) -> FloatArray:
+    """Return constant values of episodes (episodes, ...)."""
+    if all(each is episodes[0] for each in episodes):
+        return np.broadcast_to(values[0], (len(values), *values[0].shape))
+    return np.array(values)
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:
     """Return values of several episodes (episodes, ...) as vectors (episodes, n), from 0 to 1."""
-    rows = [each.reshape(len(each), -1) for each in parts]
-    joined: Plane = np.concatenate(rows, axis=1, dtype=np.float32, casting="unsafe")
-    return np.clip(joined, 0.0, 1.0, out=joined)
+    counts = [each[0].size for each in parts]
+    joined: Plane = np.empty((len(parts[0]), sum(counts)), dtype=np.float32)
+    first = 0
+    for each, count in zip(parts, counts, strict=True):
+        own = joined[:, first : first + count]
+        own[...] = each.reshape(len(each), -1)
+        if each.dtype == np.float64:  # other values are truths and shares
+            np.clip(own, 0.0, 1.0, out=own)
+        first += count
+    return joined
 
 
 def _structures(scenario: Scenario) -> FloatArray:
@@ -246,16 +254,13 @@ class DictEpisode(BatchedObservation):
     shows_vehicles: bool
 
     @staticmethod
-    def observe_many(
-        episodes: Sequence["DictEpisode"], placements: Sequence[LayoutState]
-    ) -> dict[str, Array]:
+    def observe_many(episodes: Sequence["DictEpisode"], placements: Placements) -> dict[str, Array]:
         """Return planes and vectors of several episodes, with a leading axis (episodes, ...)."""
         parts = [stock_shares(placements), np.array([each.site for each in episodes])]
-        if placements[0].catalogue.has_items:
+        if placements.rules[0].catalogue.has_items:
             parts.append(items_left(placements))
         if episodes[0].shows_vehicles:
-            pairs = zip(episodes, placements, strict=True)
-            parts.append(np.stack([_stand_off(each.vehicles, own.layout) for each, own in pairs]))
+            parts.append(_stand_offs([each.vehicles for each in episodes], placements))
         planes = ImageEpisode.observe_many([each.planes for each in episodes], placements)
         return {"planes": planes, "vector": _joined(parts)}
 
@@ -273,10 +278,15 @@ def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> Fl
     )
 
 
-def _stand_off(vehicles: VehicleView, layout: Layout) -> FloatArray:
-    """Return the stand-off as a share of the site's diagonal (1,)."""
-    site = vehicles.scenario.site
-    return np.array([vehicles.stand_off_m(layout) / hypot(site.width_m, site.height_m)])
+def _stand_offs(vehicles: Sequence[VehicleView], placements: Placements) -> FloatArray:
+    """Return the stand-off of each episode as a share of the site's diagonal (episodes, 1)."""
+    shares = []
+    for position, each in enumerate(vehicles):
+        site = each.scenario.site
+        shares.append(
+            each.stand_off_m(placements.layout(position)) / hypot(site.width_m, site.height_m)
+        )
+    return np.array(shares)[:, np.newaxis]
 
 
 OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(

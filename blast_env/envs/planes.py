@@ -21,11 +21,12 @@ from blast_env.envs.observable import (
     cost_shares,
     height_share,
     item_values,
+    items_left,
     items_placed,
     stock_shares,
 )
 from blast_env.geometry import Rectangle
-from blast_env.layout import LayoutState
+from blast_env.layout.batch import Placements
 from blast_env.sections import PointM
 from blast_env.site import (
     AnySource,
@@ -311,7 +312,7 @@ class GridEpisode(BatchedObservation):
     vehicles: VehicleView
 
     @staticmethod
-    def observe_many(episodes: Sequence["GridEpisode"], placements: Sequence[LayoutState]) -> Plane:
+    def observe_many(episodes: Sequence["GridEpisode"], placements: Placements) -> Plane:
         """Return the planes of several episodes (episodes, channels, rows, columns)."""
         planes = np.array([each.static for each in episodes])
         GridEpisode.draw(episodes, placements, planes)
@@ -320,7 +321,7 @@ class GridEpisode(BatchedObservation):
     @staticmethod
     def draw(
         episodes: Sequence["GridEpisode"],
-        placements: Sequence[LayoutState],
+        placements: Placements,
         planes: NDArray[np.uint8],
     ) -> None:
         """Draw the planes that change over the constant ones, 255 for 1.
@@ -331,27 +332,26 @@ class GridEpisode(BatchedObservation):
             planes: All planes (episodes, channels, rows, columns), changed in place.
         """
         channels = episodes[0].channels
-        legal = np.array([each.legal for each in placements])
-        uniform, on_cells = stock_shares(placements), cells_shown(placements, legal)
+        uniform, on_cells = stock_shares(placements), cells_shown(placements)
         names, cell_names = ["stock_share", "stock", "budget_share"], ["barrier", "free"]
         if BARRIER_HEIGHT in channels:
-            left, of_items = items_placed(placements, legal)
-            uniform = np.hstack((uniform, left))
+            uniform = np.hstack((uniform, items_left(placements)))
             names += episodes[0].ending(":left")
-            on_cells = np.concatenate((on_cells, of_items), axis=1)
+            on_cells = np.concatenate((on_cells, items_placed(placements)), axis=1)
             cell_names += [BARRIER_HEIGHT, "stops_vehicles", *episodes[0].ending(":legal")]
         planes[:, [channels.index(each) for each in names]] = _levels(uniform)[..., None, None]
         numbers = [channels.index(each) for each in cell_names]
         levels = _levels(on_cells)
-        for own, of_cells, whole, each, placement in zip(
-            planes, levels, on_cells, episodes, placements, strict=True
+        for position, (own, of_cells, whole, each) in enumerate(
+            zip(planes, levels, on_cells, episodes, strict=True)
         ):
             if each.zone.squares is None:
                 own[numbers] = _levels(each.zone.plane(whole))
             else:
                 own[numbers, *each.zone.squares] = of_cells
             if REACH in channels:
-                own[channels.index(REACH)] = _levels(each.vehicles.reached(placement.layout))
+                reached = each.vehicles.reached(placements.layout(position))
+                own[channels.index(REACH)] = _levels(reached)
 
     def ending(self, ending: str) -> tuple[str, ...]:
         """Return the names of the planes with an ending, in their order."""
@@ -460,7 +460,7 @@ class ImageEpisode(BatchedObservation):
 
     @staticmethod
     def observe_many(
-        episodes: Sequence["ImageEpisode"], placements: Sequence[LayoutState]
+        episodes: Sequence["ImageEpisode"], placements: Placements
     ) -> NDArray[np.uint8]:
         """Return the images of several episodes (episodes, height, width, channels)."""
         images = np.array([each.static for each in episodes])

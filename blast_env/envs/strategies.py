@@ -1,17 +1,24 @@
 """Strategies with names: threat models, sources of scenarios, rewards."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.evaluator import DesignProblem
+from blast_env.evaluation.evaluator import Assessment
 from blast_env.geometry import Layout
-from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, find_scenario
+from blast_env.site import (
+    AnyCharge,
+    AnyScenario,
+    AnySource,
+    ObjectiveSection,
+    Scenario,
+    find_scenario,
+)
 from blast_env.site.sources import source_of
 from blast_env.sites import FAMILIES, training_sites
 
@@ -170,25 +177,24 @@ def _sizes(scenario: Scenario, has_room: bool) -> tuple[tuple[object, ...], ...]
     return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles, term
 
 
-@dataclass(frozen=True)
-class Transition:
+class Transition(NamedTuple):
     """The change of the layout by one action.
 
     Attributes:
+        objective: The objective of the scenario.
         initial: The layout at `reset`.
         before: The layout before the action.
         after: The layout after it; the same, unless the action placed a module or a piece.
         begins: Whether it is the first action of the episode.
         ended: Whether the charge goes off now.
-        problem: Assesses layouts under the threats of the episode.
     """
 
+    objective: ObjectiveSection
     initial: Layout
     before: Layout
     after: Layout
     begins: bool
     ended: bool
-    problem: DesignProblem
 
 
 class Reward(Protocol):
@@ -201,8 +207,22 @@ class Reward(Protocol):
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
         """Return the names of the terms; `invalid_actions` is reserved for the environment."""
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the terms, in the order of their names; the reward is their sum."""
+    def layouts(self, transition: Transition) -> Sequence[Layout]:
+        """Return the layouts of the transition, or (), whose loads the reward of it needs.
+
+        The environment sets off the charges against them, once in an episode. At the end, it does
+        so against `after` and () in any case.
+        """
+
+    def __call__(
+        self, transition: Transition, loads: Mapping[Layout, Assessment]
+    ) -> Mapping[str, float]:
+        """Return the terms, in the order of their names; the reward is their sum.
+
+        Args:
+            transition: The change of the layout.
+            loads: The loads with the layouts asked for so far.
+        """
 
 
 DEPOSIT: Final = 2.0
@@ -224,16 +244,20 @@ class TerminalReward:
         """Return `impulse` (psi s), `peak` (psi), `load` (both) or `response`, and `deposit`."""
         return scenario.objective.term, "deposit"
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
+    def layouts(self, transition: Transition) -> Sequence[Layout]:
+        """Return no barrier, at the beginning."""
+        return ((),) if transition.begins else ()
+
+    def __call__(
+        self, transition: Transition, loads: Mapping[Layout, Assessment]
+    ) -> Mapping[str, float]:
         """Return the term of the load, 0 before the end, and `deposit`, 0 in between."""
-        reward_value = transition.problem.reward_value
-        load = deposit = 0.0
+        objective, load, deposit = transition.objective, 0.0, 0.0
         if transition.begins != transition.ended:
-            deposit = DEPOSIT * reward_value(())
+            deposit = DEPOSIT * objective.reward_value(loads[()].load)
         if transition.ended:
-            load = -reward_value(transition.after)
-        term = transition.problem.scenario.objective.term
-        return {term: load, "deposit": deposit if transition.ended else -deposit}
+            load = -objective.reward_value(loads[transition.after].load)
+        return {objective.term: load, "deposit": deposit if transition.ended else -deposit}
 
 
 @dataclass(frozen=True)
@@ -250,15 +274,25 @@ class IncrementalReward:
         """Return the term of the load, named as by `TerminalReward`."""
         return (scenario.objective.term,)
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
+    def layouts(self, transition: Transition) -> Sequence[Layout]:
+        """Return the layouts before and after the action, and at first the initial one."""
+        changed = (transition.before, transition.after) if _has_changed(transition) else ()
+        return (*changed, transition.initial) if transition.begins else changed
+
+    def __call__(
+        self, transition: Transition, loads: Mapping[Layout, Assessment]
+    ) -> Mapping[str, float]:
         """Return the load that the action took off."""
-        load = 0.0
-        reward_value = transition.problem.reward_value
-        if transition.after != transition.before:
-            load += reward_value(transition.before) - reward_value(transition.after)
+        load, value = 0.0, transition.objective.reward_value
+        if _has_changed(transition):
+            load += value(loads[transition.before].load) - value(loads[transition.after].load)
         if transition.begins:
-            load -= reward_value(transition.initial)
-        return {transition.problem.scenario.objective.term: load}
+            load -= value(loads[transition.initial].load)
+        return {transition.objective.term: load}
+
+
+def _has_changed(transition: Transition) -> bool:
+    return transition.after != transition.before
 
 
 @dataclass(frozen=True)
@@ -274,13 +308,18 @@ class ReductionReward:
         """Return `reduction`."""
         return ("reduction",)
 
-    def __call__(self, transition: Transition) -> Mapping[str, float]:
+    def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
+        """Return none: those at the end are enough."""
+        return ()
+
+    def __call__(
+        self, transition: Transition, loads: Mapping[Layout, Assessment]
+    ) -> Mapping[str, float]:
         """Return the term `reduction`, 0 before the end."""
-        reduction = 0.0
-        if transition.ended:
-            protected, unprotected = map(transition.problem.assess, (transition.after, ()))
-            reduction = float(np.nan_to_num(protected.reduction_from(unprotected)))
-        return {"reduction": reduction}
+        if not transition.ended:
+            return {"reduction": 0.0}
+        reduction = loads[transition.after].reduction_from(loads[()])
+        return {"reduction": float(np.nan_to_num(reduction))}
 
 
 REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(

@@ -1,25 +1,22 @@
 """The vector entry point of `gymnasium.make_vec`: many barrier environments in one batch."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space, concatenate, create_empty_array
+from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.envs.arguments import PlainSpec, ResetOptions, check_names
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.episode import Episode, total
-from blast_env.envs.observable import MASK, BatchedObservation, one_of
+from blast_env.envs.episode import Episode, Episodes
+from blast_env.envs.observable import one_of
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.evaluation.evaluator import run_together
 from blast_env.evaluation.store import BlastStore
-from blast_env.layout.placement import find_legal
 from blast_env.values import whole_number
 
 _LOADS_EACH: Final = 64
@@ -66,8 +63,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         if arguments.get("cache") is None:
             arguments["cache"] = BlastStore(size=_LOADS_EACH * self.num_envs)
         self.one = BlastBarrierEnv(**arguments)
-        evaluators = self.one.task.evaluators
-        evaluators.most = max(evaluators.most, self.num_envs)  # a site of its own each
+        self.episodes = Episodes(self.one.task, self.num_envs)
         self.single_action_space = self.one.action_space
         self.single_observation_space = self.one.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -76,7 +72,6 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self._most_steps = max_episode_steps or np.inf
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
-        self._episodes: list[Episode] = []
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
 
@@ -105,7 +100,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             raise BlastEnvError(f"seed has {len(seeds)} values, must have num_envs = {count}")
         given = dict(options or {})
         mask = np.asarray(given.pop("reset_mask", np.ones(count, dtype=np.bool_)))
-        if mask.shape != (count,) or mask.dtype != np.bool_ or not (mask.all() or self._episodes):
+        if mask.shape != (count,) or mask.dtype != np.bool_ or not (mask.all() or self._running):
             raise BlastEnvError(
                 f"reset_mask has shape {mask.shape} and type {mask.dtype}, must be ({count},) and"
                 " bool, and all True at first"
@@ -116,7 +111,8 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
                 self._rngs[index], self._seeds[index] = seeding.np_random(seeds[index])
         self._seed_missing()
         self._begin(chosen, ResetOptions.from_mapping(given))
-        return self._observe(self._episodes), self._information(chosen)
+        self._over[chosen] = False
+        return self._observe(self._all), self._information(chosen)
 
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
@@ -147,24 +143,27 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
                 the mode is `"Disabled"`.
         """
         played, begun = _indices(~self._over), _indices(self._over)
-        if not self._episodes or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
+        if not self._running or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
             raise gym.error.ResetNeeded(f"call reset: no episode in environments {begun}")
         wanted = self._checked(actions, played)
         for index in played:
-            self._episodes[index].move(wanted[index], self.one.illegal)
-        rewards = self._pay(played)
-        self._steps[played] += 1
+            self.episodes.place(index, wanted[index])
+        self.episodes.blast(played)
+        rewards = np.zeros(self.num_envs)
+        rewards[played] = [self.episodes.reward(index) for index in played]
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        terminated[played] = [self._episodes[index].ended for index in played]
+        terminated[played] = [self._running[index].ended for index in played]
+        self._steps[played] += 1
         truncated = self._steps >= self._most_steps
         truncated[begun] = False
-        self._begin(begun, ResetOptions())
         self._over = terminated | truncated
+        self._begin(begun, ResetOptions())
+        self._over[begun] = False
         final: dict[str, Any] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
             final = self._begin_again(_indices(self._over))
-        infos = self._information(range(self.num_envs)) | final
-        return self._observe(self._episodes), rewards, terminated, truncated, infos
+        infos = self._information(self._all) | final
+        return self._observe(self._all), rewards, terminated, truncated, infos
 
     def action_masks(self) -> BoolArray:
         """Return the masks of actions that are legal now, (environments, actions).
@@ -172,9 +171,17 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
         """
-        if not self._episodes:
+        if not self._running:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
-        return np.array([each.action_mask() for each in self._episodes])
+        return self.episodes.masks(self._all).astype(np.bool_)
+
+    @property
+    def _running(self) -> Sequence[Episode]:
+        return self.episodes.running
+
+    @property
+    def _all(self) -> range:
+        return range(self.num_envs)
 
     def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> list[int]:
         given = np.asarray(actions)
@@ -191,85 +198,68 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         wanted: list[int] = given.tolist()
         return wanted
 
-    def _pay(self, played: list[int]) -> FloatArray:
-        """Run the blasts; return the rewards."""
-        episodes = [self._episodes[index] for index in played]
-        find_legal(each.placement for each in episodes)
-        run_together(blast for each in episodes for blast in each.blasts_due())
-        rewards = np.zeros(self.num_envs)
-        for index, episode in zip(played, episodes, strict=True):
-            rewards[index] = total(episode.pay(self.one.reward_strategy, self.one.illegal))
-        return rewards
-
-    def _begin(self, chosen: list[int], options: ResetOptions) -> None:
-        """Begin an episode in some environments."""
-        if not self._episodes:
-            self._episodes = [self._drawn(index, options) for index in range(self.num_envs)]
-        else:
-            for index in chosen:
-                self._episodes[index] = self._drawn(index, options)
-        find_legal(self._episodes[index].placement for index in chosen)
+    def _begin(self, chosen: Sequence[int], options: ResetOptions) -> None:
+        """Begin an episode in some environments; the first time in all."""
+        for index in chosen if self._running else self._all:
+            rng = self._rngs[index]
+            assert rng is not None
+            self.episodes.begin(index, rng, options)
         self._steps[chosen] = 0
-        self._over[chosen] = False
 
-    def _drawn(self, index: int, options: ResetOptions) -> Episode:
-        rng = self._rngs[index]
-        assert rng is not None
-        return self.one.task.start(rng, options, self.one.reward_strategy)
-
-    def _begin_again(self, over: list[int]) -> dict[str, Any]:
+    def _begin_again(self, over: Sequence[int]) -> dict[str, Any]:
         """Begin episodes where others have ended; return the last observation and information."""
         if not over:
             return {}
-        ended = [self._episodes[index] for index in over]
-        last, final = self._observe(ended), dict[str, Any]()
-        for number, (index, episode) in enumerate(zip(over, ended, strict=True)):
-            kept = {"final_obs": one_of(last, number), "final_info": episode.information()}
+        last, final = self._observe(over), dict[str, Any]()
+        for position, index in enumerate(over):
+            kept = {
+                "final_obs": one_of(last, position),
+                "final_info": self.episodes.information(index),
+            }
             final = self._add_info(final, kept, index)
         self._begin(over, ResetOptions())
+        self._over[over] = False
         return final
 
-    def _information(self, chosen: Iterable[int]) -> dict[str, Any]:
-        """Return the information after every action and after `reset`, in arrays."""
+    def _observe(self, chosen: Sequence[int]) -> Any:
+        return self.episodes.observe(chosen, self.single_observation_space)
+
+    def _information(self, chosen: Sequence[int]) -> dict[str, Any]:
+        """Return the information after every action and after `reset`, in arrays.
+
+        They are those that Gymnasium makes of the information of single environments.
+        """
         known = np.zeros(self.num_envs, dtype=bool)
-        known[list(chosen)] = True
-        return _stacked([episode.information() for episode in self._episodes], known)
+        known[chosen] = True
+        layouts, running = self.episodes.layouts, self._running
+        names = running[0].terms
+        arrays: dict[str, Any] = {
+            "action_mask": self.episodes.masks(self._all),
+            "invalid_actions": np.array([each.invalid_actions for each in running]),
+            "placed": layouts.table.sum(axis=(1, 2, 3), dtype=np.int64),
+            "layout": layouts.table.copy(),
+        }
+        for name in running[0].constants:
+            arrays[name] = _objects([each.constants[name] for each in running])
+        outcomes = [each.outcome for each in running]
+        for name, first in outcomes[0].items():
+            values = [each[name] for each in outcomes]
+            arrays[name] = np.array(values) if isinstance(first, _NUMBERS) else _objects(values)
+        terms = {name: np.array([each.terms[name] for each in running]) for name in names}
+        for values in (*arrays.values(), *terms.values()):
+            values[~known] = None if values.dtype == object else 0
+        arrays["reward_terms"] = terms | {f"_{name}": known.copy() for name in terms}
+        return arrays | {f"_{name}": known.copy() for name in arrays}
 
-    def _observe(self, episodes: Sequence[Episode]) -> Any:
-        """Return the observations of episodes, with a leading axis."""
-        shown, space = [each.shown for each in episodes], self.single_observation_space
-        kind = episodes[0].observation
-        if not isinstance(kind, BatchedObservation):
-            empty: Any = create_empty_array(space, len(episodes))
-            return concatenate(space, [each.observe() for each in episodes], empty)
-        observed = kind.observe_many([each.observation for each in episodes], shown)
-        if isinstance(space, spaces.Dict):
-            masks = np.array([each.action_mask() for each in episodes])
-            observed |= {MASK: masks.astype(np.int8)}
-        return observed
+
+_NUMBERS: Final = (bool, int, float)
 
 
-def _stacked(infos: Sequence[Mapping[str, Any]], known: BoolArray) -> dict[str, Any]:
-    """Return the information of all environments in arrays, as `VectorEnv._add_info` does.
-
-    Args:
-        infos: That of each environment, with the same keys.
-        known: Whether an environment's information is returned; it is 0 or `None` otherwise.
-    """
-    stacked: dict[str, Any] = {}
-    for key, first in infos[0].items():
-        values = [each[key] for each in infos]
-        if isinstance(first, Mapping):
-            stacked[key] = _stacked(values, known)
-        elif isinstance(first, np.ndarray | int | float):
-            stacked[key] = np.array(values)
-            stacked[key][~known] = 0
-        else:
-            stacked[key] = np.empty(len(infos), dtype=object)
-            for index in np.flatnonzero(known):
-                stacked[key][index] = values[index]
-        stacked[f"_{key}"] = known.copy()
-    return stacked
+def _objects(values: Sequence[Any]) -> NDArray[np.object_]:
+    array = np.empty(len(values), dtype=object)
+    for index, value in enumerate(values):
+        array[index] = value
+    return array
 
 
 def _indices(mask: BoolArray) -> list[int]:

@@ -216,20 +216,34 @@ def _run(
             yield key, loads
 
 
-def run_together(
-    asked: Iterable[tuple[BlastEvaluator, Layout, LoadCase]], processes: int = 1
-) -> None:
-    """Run blasts of evaluators with one engine in one batch and cache their loads.
+def loads_together(
+    asked: Sequence[tuple[BlastEvaluator, Layout, LoadCase]], processes: int = 1
+) -> list[BlastLoads]:
+    """Return the loads of blasts on several sites by one engine, run in one batch.
 
-    Cached ones are not run. Errors are those of `BlastEvaluator.loads_of_many`.
+    They are those of `BlastEvaluator.loads_of_many`, whose errors are the same.
     """
+    keys = [evaluator.key(layout, threat) for evaluator, layout, threat in asked]
+    found: dict[BlastKey, BlastLoads] = {}
     missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
-    for evaluator, layout, threat in asked:
-        key = evaluator.key(layout, threat)
-        if key not in missing and evaluator.store.get(key, evaluator.scenario) is None:
+    for key, (evaluator, _, threat) in zip(keys, asked, strict=True):
+        if key in found or key in missing:
+            continue
+        known = evaluator.store.get(key, evaluator.scenario)
+        if known is None:
             missing[key] = evaluator, threat.charge
-    for _ in _run(missing, processes):
-        pass
+        else:
+            found[key] = known
+    if asked:
+        asked[0][0].counts.cache_hits += len(keys) - len(missing)
+    found.update(_run(missing, processes))
+    loads = []
+    for key, (evaluator, layout, _) in zip(keys, asked, strict=True):
+        objective, own = evaluator.scenario.objective, found[key]
+        if objective.kind == "response":
+            own = own.with_facades(evaluator.scenario.named_bays(layout), objective)
+        loads.append(own)
+    return loads
 
 
 _MOST_EVALUATORS: Final = 4

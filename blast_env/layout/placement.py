@@ -234,6 +234,16 @@ class LayoutState:
         return self._empty_zone.usable
 
     @property
+    def fits(self) -> BoolArray:
+        """Whether each variant may be placed on the empty site (variants, rows, columns)."""
+        return self._empty_zone.fits
+
+    @property
+    def passable(self) -> BoolArray:
+        """Whether each cell is free of structures without a passage (rows, columns)."""
+        return self._empty_zone.passable
+
+    @property
     def ground_m(self) -> FloatArray:
         """Height of the ground of each cell, m (rows, columns), read-only."""
         return self._empty_zone.ground_m

@@ -15,6 +15,7 @@ from pydantic import (
     model_validator,
 )
 
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
 from blast_env.hashing import Hashed, digest_of, fields_with, hashed_content
@@ -341,13 +342,20 @@ class Scenario(Content):
 
     def sample_charge(self, rng: np.random.Generator) -> AnyCharge:
         """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst place."""
-        weights = np.array([source.weight for source in self.charge])
         # Drawn also for a single source, so that adding one does not shift the stream.
-        chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
+        chosen = int(self._charge_shares.searchsorted(rng.random(), side="right"))
         source = self.charge[chosen]
         if isinstance(source, VehicleSource):
             return VehicleCharge(source)
         return Charge(source.sample_position_m(rng), source.tnt_kg, source.height_m)
+
+    @cached_property
+    def _charge_shares(self) -> FloatArray:
+        """Cumulative probabilities of the sources, as by `Generator.choice` (sources,)."""
+        weights = np.array([source.weight for source in self.charge])
+        sums = (weights / weights.sum()).cumsum()
+        shares: FloatArray = sums / sums[-1]
+        return shares
 
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:

@@ -46,7 +46,8 @@ def actions_for(actions: NumberedActions, placement: LayoutState, element: Eleme
         made.append(actions.first[chosen.choices] + int(actions.choices[chosen.choices][place]))
         found = actions.narrowed(chosen, made[-1])
         if not isinstance(found, ActionChoice):
-            assert found == element
+            assert found is not None
+            assert placement.catalogue.element(found) == element
             return made
         chosen = found
 
@@ -76,7 +77,10 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
         for action in np.flatnonzero(mask[:-1]).tolist():
             after = actions.narrowed(chosen, action)
             assert after is not None
-            found += elements(after) if isinstance(after, ActionChoice) else [after]
+            if isinstance(after, ActionChoice):
+                found += elements(after)
+            else:
+                found.append(scenario.zone.catalogue.element(after))
         return found
 
     placement = LayoutState.empty(scenario)

@@ -15,6 +15,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastStore, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.units import PA_PER_PSI
@@ -193,7 +194,10 @@ class PayPerModule:
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
         return "modules", "end"
 
-    def __call__(self, transition: Transition) -> dict[str, float]:
+    def layouts(self, transition: Transition) -> tuple[Layout, ...]:
+        return ()
+
+    def __call__(self, transition: Transition, loads: object) -> dict[str, float]:
         return {"modules": float(len(transition.after)), "end": -7.0 * transition.ended}
 
 

@@ -49,7 +49,7 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
         assert isinstance(env.unwrapped, barrier_env.BlastBarrierEnv)
         assert env.action_space.n > 100  # type: ignore[attr-defined]
         expected = "gas" if scenario.height_notes else "event"
-        assert env.unwrapped.task.evaluators.engine.name == expected
+        assert env.unwrapped.task.engine.name == expected
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ chance the walls that the rules know.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +27,7 @@ from blast_env.envs.observable import EpisodeObservation, Observable
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators, LoadCaseSet
-from blast_env.evaluation.evaluator import run_together
+from blast_env.evaluation.evaluator import loads_together
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site.sources import source_of
@@ -198,15 +199,13 @@ def best_by_rule(
         for layout in layouts
         for threat in case.threats
     ]
-    run_together(blasts, processes)
-    found = []
+    loads, found = iter(loads_together(blasts, processes)), []
     for case, layouts in zip(cases, tried, strict=True):
-        pairs = [(layout, threat) for layout in layouts for threat in case.threats]
-        blast_loads = evaluators.of(case.scenario).loads_of_many(pairs)
-        of_layouts = np.array([each.load(case.scenario.objective) for each in blast_loads])
+        own = islice(loads, len(layouts) * len(case.threats))
+        of_layouts = np.array([each.load(case.scenario.objective) for each in own])
         values = [
-            case.objective_value(loads, layout)
-            for loads, layout in zip(of_layouts.reshape(len(layouts), -1), layouts, strict=True)
+            case.objective_value(of_layout, layout)
+            for of_layout, layout in zip(of_layouts.reshape(len(layouts), -1), layouts, strict=True)
         ]
         best = int(np.argmin(values))
         # If nothing arrives without a barrier, no layout reduces it.

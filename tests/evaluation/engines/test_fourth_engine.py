@@ -52,7 +52,7 @@ def test_its_spec_survives_json() -> None:
     spec = gym.make("BlastBarrier-v0", engine="shade").spec
     assert spec is not None
     again = gym.make(gym.envs.registration.EnvSpec.from_json(spec.to_json()))
-    assert again.unwrapped.task.evaluators.engine == ShadeEngine()  # type: ignore[attr-defined]
+    assert again.unwrapped.task.engine == ShadeEngine()  # type: ignore[attr-defined]
 
 
 def test_layouts_are_evaluated_and_reported_with_it() -> None:

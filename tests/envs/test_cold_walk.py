@@ -1,0 +1,53 @@
+"""How much a reader has to follow: the code entered by `make`, `reset` and the first step."""
+
+import json
+import subprocess
+import sys
+from typing import Final
+
+import pytest
+
+MOST_FILES: Final = {"make": 112, "reset": 30, "step": 52}
+MOST_FUNCTIONS: Final = {"make": 660, "reset": 184, "step": 370}
+
+_WALK: Final = """
+import json, os, sys
+import gymnasium as gym, numpy as np
+import blast_env
+
+root, walked = os.path.dirname(blast_env.__file__), {}
+
+def walk(name, call):
+    entered = walked[name] = set()
+    def note(frame, event, _):
+        code = frame.f_code
+        if event == "call" and code.co_filename.startswith(root):
+            entered.add((code.co_filename, code.co_qualname))
+    sys.setprofile(note)
+    try:
+        return call()
+    finally:
+        sys.setprofile(None)
+
+env = walk("make", lambda: gym.make("BlastBarrier-v0"))
+walk("reset", lambda: env.reset(seed=0))
+action = int(np.flatnonzero(env.unwrapped.action_masks())[0])
+walk("step", lambda: env.step(action))
+counts = {name: (len({file for file, _ in each}), len(each)) for name, each in walked.items()}
+print(json.dumps(counts))
+"""
+
+
+@pytest.fixture(scope="module")
+def walked() -> dict[str, tuple[int, int]]:
+    """Files and pieces of code (functions, classes, modules) entered in a fresh process."""
+    done = subprocess.run([sys.executable, "-c", _WALK], capture_output=True, text=True, check=True)
+    found: dict[str, tuple[int, int]] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+@pytest.mark.parametrize("name", MOST_FILES)
+def test_the_walk_is_short(walked: dict[str, tuple[int, int]], name: str) -> None:
+    files, functions = walked[name]
+    assert files <= MOST_FILES[name]
+    assert functions <= MOST_FUNCTIONS[name]

@@ -1,0 +1,51 @@
+"""Layouts that grow in place: at every step the legal places are those found anew."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.layout import LayoutState
+from blast_env.layout.batch import LayoutBatch, PlacementRules, Placements
+from blast_env.site import Scenario, load_scenario
+from tests.catalogue_sites import yard
+from tests.envs.small import restricted_scenario, small_scenario
+from tests.site.test_hardening import glazed_yard
+
+SITES = (
+    *(small_scenario(), restricted_scenario(), yard(), glazed_yard()),
+    *map(load_scenario, ("control_room", "government_forecourt")),
+)
+
+
+@pytest.mark.parametrize("scenario", SITES, ids=lambda each: each.name)
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), begun=st.integers(0, 2))
+def test_a_layout_grows_as_one_placed_piece_by_piece(
+    scenario: Scenario, seed: int, begun: int
+) -> None:
+    """With stocks, a budget, an access way, terraces and measures; the other layout stays."""
+    rng, state = np.random.default_rng(seed), LayoutState.empty(scenario)
+    for _ in range(begun):
+        legal = np.flatnonzero(state.legal)
+        state = state.place(state.catalogue.element(int(rng.choice(legal))))
+    batch = LayoutBatch(LayoutState.empty(scenario), 2)
+    rules = PlacementRules.of(state)
+    batch.begin(0, rules, LayoutState.empty(scenario))
+    batch.begin(1, rules, state)
+    for _ in range(8):
+        if state.is_full:
+            break
+        number = int(rng.choice(np.flatnonzero(state.legal)))
+        state = state.place(state.catalogue.element(number))
+        batch.place(1, number)
+        found, expected = batch.placements([1]), Placements.of(state)
+        assert (found.legal == state.legal).all()
+        assert (found.standing == state.standing).all()
+        assert (batch.table[1] == state.catalogue.table(state.layout)).all()
+        assert found.layout(0) == expected.layout(0) == state.layout
+        assert found.left[0, 0] == state.stock_left
+        left = np.minimum(found.left[:, 1:], found.left[:, :1])
+        assert left.tolist() == [list(state.stocks_left)]
+        assert found.budget_left.tolist() == expected.budget_left.tolist()
+    assert (batch.state(0).legal == LayoutState.empty(scenario).legal).all()
