@@ -1,9 +1,10 @@
 """Checks of the response of buildings: the tables of docs/engineers/response.md.
 
-`python -m studies.response tables` prints those without a blast, `cells` and `angles` the others.
+`python -m studies.response tables` prints those without a blast, `cells`, `angles`, `peaks` and
+`raised` the others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from math import atan2, degrees, pi
 from typing import Annotated, Final
@@ -14,6 +15,7 @@ import typer
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.curves import normally_reflected_pa, oblique, reflected_pa
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.screening import screen
 from blast_env.response.components import Glazing, catalogue
@@ -37,6 +39,7 @@ from blast_env.response.walls import (
 from blast_env.site import Scenario
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
+from studies.gas.reference import free_field_gauges
 
 E1300: Final = (
     (4.57, 2.0, 2.0, 1.048),
@@ -149,8 +152,10 @@ OPEN_M: Final = 22.0
 PERIODS_S: Final = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 
 
-def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float) -> Scenario:
-    """Return a scene in the open: a charge on the ground in front of the middle of a wall."""
+def open_wall(
+    stand_off_m: float, width_m: float, height_m: float, tnt_kg: float, up_m: float = 0.0
+) -> Scenario:
+    """Return a scene in the open: a charge in front of the middle of a wall, at a height."""
     middle_m = 0.5 * width_m + 4.0
     office = {
         "kind": "ModularObstacle",
@@ -171,7 +176,14 @@ def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float
             "height_m": width_m + 8.0,
             "air_height_m": height_m + 5.0,
         },
-        "charge": [{"kind": "point", "position_m": [4.0, middle_m], "tnt_kg": tnt_kg}],
+        "charge": [
+            {
+                "kind": "point",
+                "position_m": [4.0, middle_m],
+                "tnt_kg": tnt_kg,
+                "height_m": up_m,
+            }
+        ],
         "structures": [office],
     }
     return Scenario.from_document(document, "open")
@@ -272,6 +284,66 @@ def angle_rows(width_m: float) -> Iterator[Row]:
         )
 
 
+_FARTHEST: Final = 2.9  # of a place aside, over the distance of the wall
+_SLANTS_DEG: Final = (5.0, 20.0, 30.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0)
+
+RAISED_KG: Final = 20.0
+"""Mass of the charges of `raised_rows`."""
+
+
+def raised_rows(distance_m: float, heights_m: Sequence[float], cell_m: float) -> Iterator[Row]:
+    """Yield one row per height of a charge: impulse and peak of a wall by gas and by screening.
+
+    They are those of the lowest bay before the charge, peaks over those of a charge on the ground.
+    """
+    first: tuple[float, float] | None = None
+    for height_m in heights_m:
+        site = open_wall(distance_m, 12.0, 7.0, RAISED_KG, height_m)
+        loads = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().bay_loads
+        bay = screen(site).threats[0].bays[1]
+        index = [each.bay.name for each in loads.bays].index(bay.filled.bay.name)
+        time_s, pressure_pa = loads.histories
+        gas_pa_s = float(impulses(time_s, pressure_pa[index : index + 1]).max())
+        peaks = float(pressure_pa[index].max()), bay.peak_pa
+        first = peaks if first is None else first
+        yield (
+            f"{distance_m:g} m",
+            f"{height_m:g} m",
+            f"{gas_pa_s:.0f}",
+            f"{bay.impulse_pa_s:.0f}",
+            f"{gas_pa_s / bay.impulse_pa_s:.2f}",
+            f"{peaks[0] / first[0]:.2f}",
+            f"{peaks[1] / first[1]:.2f}",
+        )
+
+
+def slanting_rows(distance_m: float, tnt_kg: float, cell_m: float) -> Iterator[Row]:
+    """Yield one row per angle: peak on a wall over the incident one, by gas, theory and rule."""
+    site = open_wall(distance_m, 2.0 * _FARTHEST * distance_m, 3.0, tnt_kg)
+    faces = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().faces
+    charge_y_m = 0.5 * site.site.height_m
+    own = faces[(faces["face"] == "west") & (faces["z_m"] < cell_m) & (faces["y_m"] > charge_y_m)]
+    aside_m = own["y_m"].to_numpy() - charge_y_m
+    angle_deg = np.degrees(np.arctan2(aside_m, distance_m))
+    farther_m = (distance_m * np.linspace(0.9, 1.1 * _FARTHEST, 24)).tolist()
+    gauges = free_field_gauges(tnt_kg, farther_m, cell_m)
+    at_m = cell_m * np.array([np.hypot(x + 0.5, np.sqrt(0.5)) for x, *_ in gauges.cells])
+    for wanted_deg in _SLANTS_DEG:
+        index = int(np.abs(angle_deg - wanted_deg).argmin())
+        away_m = np.hypot(distance_m, aside_m[index])
+        cosine = np.array(distance_m / away_m)
+        log_pa = np.interp(np.log(away_m), np.log(at_m), np.log(gauges.peak_pa))
+        gas = own["peak_pa"].to_numpy()[index] / np.exp(log_pa)
+        incident = np.array(kingery_bulmash("incident_overpressure", away_m, tnt_kg))
+        theory = float(reflected_pa(incident, cosine) / incident)
+        rule = float(oblique(normally_reflected_pa(incident), incident, cosine) / incident)
+        yield (
+            f"{angle_deg[index]:.0f} degrees",
+            f"{1e-3 * float(incident):.0f}",
+            *(f"{each:.2f}" for each in (gas, theory, rule)),
+        )
+
+
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -317,6 +389,32 @@ def angles(
     with user_errors():
         headers = ("angle in plan", "gas, Pa s", "rule, Pa s", "gas over the rule")
         print_line(markdown_table(headers, angle_rows(width)))
+
+
+@app.command()
+def raised(
+    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.5,
+    distances: Annotated[str, typer.Option(help="Distances of the wall, m.")] = "8,10,15,20",
+    heights: Annotated[str, typer.Option(help="Heights of the charge, m.")] = "0,0.2,0.5,1.1,2,3",
+) -> None:
+    """Print loads of a charge above the ground on a wall, by gas and by screening: 20 kg."""
+    with user_errors():
+        at_m, up_m = ([float(each) for each in text.split(",")] for text in (distances, heights))
+        headers = ("wall at", "charge at", "gas, Pa s", "screening, Pa s", "gas over screening")
+        peaks = ("peak over that on the ground, gas", "screening")
+        rows = [row for each in at_m for row in raised_rows(each, up_m, cell)]
+        print_line(markdown_table((*headers, *peaks), rows))
+
+
+@app.command()
+def peaks(
+    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.25,
+    distance: Annotated[float, typer.Option(help="Distance of the wall, m.")] = 8.0,
+) -> None:
+    """Print peaks of slanting waves on a wall over the incident ones, by gas and theory: 8 kg."""
+    with user_errors():
+        headers = ("angle", "incident, kPa", "gas", "screening", "rule of impulses")
+        print_line(markdown_table(headers, slanting_rows(distance, 8.0, cell)))
 
 
 if __name__ == "__main__":

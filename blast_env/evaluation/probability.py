@@ -27,7 +27,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.curves import Quantity, burst_of, within_curves
+from blast_env.curves import Load, normally_reflected
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import BuildingResponse, Consequences
 from blast_env.evaluation.grid_error import GridError
@@ -54,19 +54,14 @@ def load_factors(
     Distances are those from the charge and from the other one; the masses of the other one have a
     shape that broadcasts with them.
     """
-    old = np.broadcast_arrays(distance_m, charge.tnt_kg, other_m, other_kg)[:2]
-    new = np.broadcast_arrays(other_m, other_kg, distance_m)[:2]
+    old_m, old_kg, new_m, new_kg = np.broadcast_arrays(distance_m, charge.tnt_kg, other_m, other_kg)
+    loads: tuple[Load, Load] = ("overpressure", "impulse")
     peaks, impulses = (
-        _curve(quantity, charge, *new) / _curve(quantity, charge, *old)
-        for quantity in ("reflected_overpressure", "reflected_impulse")
+        normally_reflected(load, new_m, new_kg, charge.height_m)
+        / normally_reflected(load, old_m, old_kg, charge.height_m)
+        for load in loads
     )
     return peaks, impulses / peaks
-
-
-def _curve(
-    quantity: Quantity, charge: Charge, distance_m: FloatArray, tnt_kg: FloatArray
-) -> FloatArray:
-    return within_curves(quantity, distance_m, tnt_kg, burst_of(charge.height_m, charge.tnt_kg))
 
 
 def scaled_to(judged: Consequences, charge: Charge) -> Consequences:

@@ -1,8 +1,8 @@
 """Screening: the response of facades and the stand-off they need, before any blast.
 
-Loads are Kingery and Bulmash's in the open, those of a hemispherical burst near the ground. A bay
-in sight of the charge has the peak and the impulse of its middle by the angle of incidence
-(`oblique`), one out of sight the side-on values of the same distance. The history is a triangle.
+Loads are Kingery and Bulmash's in the open over rigid ground (`blast_env.curves.over_ground`). A
+bay in sight of the charge has the peak and the impulse of its middle by the angle of incidence, one
+out of sight the side-on values of the same distance. The history is a triangle.
 
 Stand-offs are for normal incidence. They end at both limits of validity: nearer than
 1.7 m/kg^(1/3) walls may be breached, and the curves end at 40 m/kg^(1/3).
@@ -12,19 +12,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, hypot
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.curves import (
-    CURVES_SCALED_M,
-    Burst,
-    Quantity,
-    burst_of,
-    in_the_open,
-    within_curves,
-)
+from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.standing import bay_middles
@@ -262,7 +255,7 @@ def screen(
         )
     facade = _Facade.of(scenario, layout, bays)
     screened = []
-    known_places: dict[object, _Seen] = {}  # threats that differ in mass alone share them
+    known_places: dict[object, Ways] = {}  # threats that differ in mass alone share them
     for name, own in sources.items():
         places = [*_places(scenario, own, layout)]
         key = tuple((each.position_m, each.height_m) for each in places)
@@ -299,8 +292,7 @@ class _Curves:
     """Kingery and Bulmash's loads of one charge in the open."""
 
     def __init__(self, charge: Charge) -> None:
-        self._tnt_kg = charge.tnt_kg
-        self._burst: Burst = burst_of(charge.height_m, charge.tnt_kg)
+        self._charge = charge
         scale = float(np.cbrt(charge.tnt_kg))
         self.least_m = CHECKED_SCALED_DISTANCE[0] * scale
         self.most_m = CURVES_SCALED_M[1] * scale
@@ -309,7 +301,8 @@ class _Curves:
     def reflected(self) -> FloatArray:
         """Distances, and the reflected peak and impulse there (3, distances)."""
         distances_m = np.geomspace(self.least_m, self.most_m, _DISTANCES)
-        loads = (within_curves(n, distances_m, self._tnt_kg, self._burst) for n in _REFLECTED)
+        _, tnt_kg, height_m = self._charge
+        loads = (normally_reflected(each, distances_m, tnt_kg, height_m) for each in _LOADS)
         return np.stack([distances_m, *loads])
 
     def stand_off_m(self, part: Pane | Panel, level: LevelOfProtection) -> float:
@@ -332,8 +325,7 @@ class _Curves:
         return float(self.reflected[0][np.argmax(kept)]) if kept.any() else np.inf
 
 
-_REFLECTED: Final[tuple[Quantity, Quantity]] = ("reflected_overpressure", "reflected_impulse")
-_QUANTITIES: Final[tuple[Literal["overpressure", "impulse"], ...]] = ("overpressure", "impulse")
+_LOADS: Final[tuple[Literal["overpressure", "impulse"], ...]] = ("overpressure", "impulse")
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,30 +372,14 @@ class _Facade:
             numbers.append(known[key])
         return np.array(numbers), parts
 
-    def seen_from(self, places: Sequence[Charge]) -> "_Seen":
-        """Return how the bays lie to places."""
-        ways, seen = [], []
+    def seen_from(self, places: Sequence[Charge]) -> Ways:
+        """Return the ways from places to the bays (places, bays)."""
+        found = []
         for each in places:
-            site = replace(self.site, charge=each)
-            ways.append(np.array([*each.position_m, each.height_m]) - self.middles_m)
-            seen.append(in_sight(site, self.middles_m, self.outward))
-        way_m = np.stack(ways)
-        away_m: FloatArray = np.linalg.norm(way_m, axis=2)
-        return _Seen(away_m, (way_m * self.outward).sum(axis=2) / away_m, np.stack(seen))
-
-
-class _Seen(NamedTuple):
-    """Distances, cosines of the angles of incidence, and sight (places, bays)."""
-
-    away_m: FloatArray
-    cosine: FloatArray
-    seen: BoolArray
-
-    def loads(self, charge: Charge) -> Iterator[FloatArray]:
-        """Yield the peak, Pa, and the impulse, Pa s, of a mass (places, bays)."""
-        burst = burst_of(charge.height_m, charge.tnt_kg)
-        for quantity in _QUANTITIES:
-            yield in_the_open(quantity, self.away_m, self.cosine, self.seen, charge.tnt_kg, burst)
+            seen = in_sight(replace(self.site, charge=each), self.middles_m, self.outward)
+            charge_m = (*each.position_m, each.height_m)
+            found.append(Ways.between(charge_m, self.middles_m, self.outward, seen))
+        return Ways(*(np.stack(each) for each in zip(*found, strict=True)))
 
 
 def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
@@ -471,9 +447,10 @@ def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
     return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
 
 
-def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen) -> ScreenedThreat:
+def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) -> ScreenedThreat:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
-    peaks, impulses = seen.loads(places[0])
+    _, tnt_kg, height_m = places[0]
+    peaks, impulses = (in_the_open(each, ways, tnt_kg, height_m) for each in _LOADS)
     numbers, parts = facade.kinds
     damage = np.zeros(peaks.shape)
     for kind, own in enumerate(parts):
@@ -485,7 +462,7 @@ def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen)
     for index, filled in enumerate(facade.bays):
         load = float(peaks[worst, index]), float(impulses[worst, index])
         response = respond([filled], *triangle(*load))
-        away_m, is_seen = seen.away_m[worst, index], seen.seen[worst, index]
+        away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
         bays.append(ScreenedBay(filled, float(away_m), bool(is_seen), *load, response))
     return ScreenedThreat(name, places[worst], len(places), tuple(bays))
 

@@ -20,6 +20,7 @@ from blast_env.compilation import compilation_notice
 from blast_env.errors import BlastEnvError
 from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
 from blast_env.gas.cost import cost_of_run
+from blast_env.gas.enclosure import room_around
 from blast_env.gas.ending import (
     AREA,
     corners_m,
@@ -245,6 +246,8 @@ class GasRun:
                 f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
                 "that its source needs"
             )
+        if room := room_around(self.grid, self.charge.position_m):
+            notes.append(room.note(self.charge.mass_kg, self.charge.explosive))
         if words := cells_unchecked(cbrt(self.charge.mass_kg) / self.settings.smallest_m):
             notes.append(words)
         return tuple(notes)

@@ -6,11 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.curves import (
-    CURVES_SCALED_M,
-    burst_of,
-    kingery_bulmash,
-)
+from blast_env.curves import CURVES_SCALED_M, Load, air_share, normally_reflected
 from blast_env.report.study import Study
 from blast_env.response.facade import FacadeResponse
 from blast_env.response.sdof import impulses
@@ -61,11 +57,15 @@ def _stand_off(study: Study) -> HandCheck:
         f"Z = {away_m:.2f} m / ({charge.tnt_kg:g} kg)^(1/3) = {away_m / scale:.2f} m/kg^(1/3)",
     ]
     if CURVES_SCALED_M[0] <= away_m / scale <= CURVES_SCALED_M[1]:
-        burst = burst_of(charge.height_m, charge.tnt_kg)
+        loads: tuple[Load, Load] = ("overpressure", "impulse")
         peak_pa, impulse_pa_s = (
-            kingery_bulmash(quantity, away_m, charge.tnt_kg, burst)
-            for quantity in ("reflected_overpressure", "reflected_impulse")
+            float(normally_reflected(each, np.array(away_m), charge.tnt_kg, charge.height_m))
+            for each in loads
         )
+        in_air = float(air_share(charge.height_m, charge.tnt_kg))
+        burst = "hemispherical" if in_air < 1.0 else "free air and its mirror image in the ground"
+        if 0.0 < in_air < 1.0:
+            burst = f"between hemispherical and free air with its mirror image, {in_air:.2f}"
         fine = next(
             each.unprotected
             for each in study.fine

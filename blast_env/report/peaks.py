@@ -1,10 +1,11 @@
 """The peak to compare with a limit: cells clip peaks, and clipping must not keep a limit.
 
 On a face in sight of the charge, the larger of the peak on its cells and Kingery and Bulmash's
-reflected peak counts: that of a hemispherical burst at normal incidence, whatever the angle and the
-height of the charge, which is conservative. On other faces, the peak on the cells is multiplied by
-the possible clipping (`peak_factor`), up to the curve, since an obstacle adds nothing to the wave
-in the open. If the cells alone exceed the curve, as between walls, it is no bound.
+reflected peak counts: that at normal incidence or at the angle of the face, whichever is larger,
+for the height of the charge (`blast_env.curves.over_ground`). On other faces, the peak on the cells
+is multiplied by the possible clipping (`peak_factor`), up to the curve, since an obstacle adds
+nothing to the wave in the open. If the cells alone exceed the curve, as between walls, it is no
+bound.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from blast_env.curves import largest_reflected_peak_pa
+from blast_env.curves import Ways, in_the_open, normally_reflected
 from blast_env.response.facade import peak_factor
 from blast_env.site.blast_site import BlastSite
 from blast_env.site.sight import in_sight
@@ -47,9 +48,11 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> Counted
     outward = np.zeros((len(faces), 3))
     outward[:, :2] = faces[["outward_x", "outward_y"]]
     seen = in_sight(site, points_m, outward)
-    away_m = np.linalg.norm(points_m - [*charge.position_m, charge.height_m], axis=1)
+    _, tnt_kg, height_m = charge
+    ways = Ways.between((*charge.position_m, height_m), points_m, outward, seen)
     gas_pa = faces["peak_pa"].to_numpy(dtype=np.float64)
-    curve_pa = largest_reflected_peak_pa(away_m, charge.tnt_kg)
+    curve_pa = normally_reflected("overpressure", ways.away_m, tnt_kg, height_m)
+    curve_pa = np.maximum(curve_pa, in_the_open("overpressure", ways, tnt_kg, height_m))
     grown_pa = peak_factor(cell_m, charge.tnt_kg) * gas_pa
     bounded = gas_pa <= curve_pa
     hidden_pa = np.where(bounded, np.minimum(grown_pa, curve_pa), grown_pa)

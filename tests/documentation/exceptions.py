@@ -120,6 +120,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env assess site.toml --screen --glazing window_laminated_6 --wall brick_215"
     " --mass backpack --gas --cells coarse": "--cells uniform --cell 0.5",
     "python -m studies.response angles": "--width 12",
+    "python -m studies.response peaks": "--cell 0.5",
+    "python -m studies.response raised": "--cell 0.5 --distances 10 --heights 0,1.1",
     # docs/researchers/training.md
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md
