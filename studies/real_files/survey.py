@@ -2,21 +2,21 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import shapely
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, import_site
+from blast_env.io.importing import ImportedSite, ImportOptions, import_site
 from blast_env.io.importing.convert import read_map
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import WGS84, SiteMap
 from blast_env.io.importing.things import Role, Thing, things_of
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
-SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf")
+SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf", ".ifc")
 
 _LIMITS: Final = ReadingLimits(processor_s=60, memory_bytes=1_000_000_000, wall_s=300.0)
 _DEGREE_M: Final = 111_000.0
@@ -33,11 +33,13 @@ class Survey:
         path: The file.
         refusal: Why it was refused; an empty string if it was not.
         sums: Number of objects by fate and kind.
+        buildings: Ground area, m2, underside and top, m, of each building by its place.
     """
 
     path: Path
     refusal: str
     sums: Counter[tuple[Fate, str]]
+    buildings: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 def survey(path: Path) -> Survey:
@@ -77,9 +79,19 @@ def _surveyed(path: Path) -> Survey:
                 raise
         else:
             kinds = ((each.fate, each.kind) for each in imported.ledger.entries)
-            return Survey(path, "", Counter(kinds))
+            return Survey(path, "", Counter(kinds), _solids(imported))
     assert error is not None
     raise error
+
+
+def _solids(site: ImportedSite) -> dict[str, tuple[float, float, float]]:
+    """Return area, underside and top of the buildings, the parts of one together."""
+    found: dict[str, tuple[float, float, float]] = {}
+    for each in site.buildings:
+        area_m2, base_m, top_m = found.get(each.place, (0.0, each.base_m, 0.0))
+        area_m2 = round(area_m2 + each.outline.area, 1)
+        found[each.place] = area_m2, min(base_m, each.base_m), max(top_m, each.height_m or 0.0)
+    return found
 
 
 def _read(path: Path) -> SiteMap:

@@ -89,7 +89,8 @@ class _Parser:
             self._marks.deleted.add((kind, int(attributes.get("id", "0"))))
         elif kind == "member":
             self._way = []
-            self._member = int(attributes["ref"]) if attributes.get("type") == "way" else 0
+            is_way = attributes.get("type") == "way"
+            self._member = int(attributes.get("ref", "0")) if is_way else 0
         elif kind == "nd" and self._way is not None:
             place = attributes.get("lon"), attributes.get("lat")
             is_known = None not in place

