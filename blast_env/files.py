@@ -7,15 +7,20 @@ import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from tempfile import TemporaryDirectory
+from time import time
 from typing import Final, TypeVar
 
 from blast_env.errors import BlastEnvError
 from blast_env.values import path_of
 
 T = TypeVar("T")
+
+_OF_TARGET: Final = 8  # digits of the name of a temporary file that tell its target
+_YOUNG_S: Final = 1.0  # a file may not be locked yet just after it was made
 
 
 def read_regular(path: str | Path, most_bytes: int) -> bytes:
@@ -73,7 +78,8 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
     The temporary file is empty, lies in the folder of `target` and has its suffix. If the block
     raises anything, `KeyboardInterrupt` included, it is deleted and `target` stays as it was. An
     existing `target` keeps its permissions, and a link stays a link. A killed process may leave a
-    temporary file behind, see `is_temporary`, and `target` as it was or complete.
+    temporary file behind, see `is_temporary`, and `target` as it was or complete; the next writer
+    of `target` removes it.
 
     Args:
         target: The file to write.
@@ -96,11 +102,14 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
     if not os.path.isdir(path.parent):
         raise BlastEnvError(f"{target}: there is no folder {str(path.parent)!r} to write it to")
     # A short name: that of `target` may already have the greatest length.
-    temporary = path.parent / f".{secrets.token_hex(8)}{path.suffix}"
+    own = f".{sha256(os.fsencode(path.name)).hexdigest()[:_OF_TARGET]}"
+    temporary = path.parent / f"{own}{secrets.token_hex(4)}{path.suffix}"
     try:
+        _remove_left(path.parent, own)
         # Not tempfile: its files are private to the user and ignore the umask.
-        temporary.open("xb").close()
-        yield temporary
+        with temporary.open("xb") as file:
+            _lock(file.fileno())
+            yield temporary
         if os.path.exists(path):
             shutil.copymode(path, temporary)
         if durable:
@@ -139,6 +148,31 @@ def scratch_folder() -> Iterator[Path]:
             yield Path(folder)
     except OSError as error:
         raise _cannot_write("a scratch folder", error) from error
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file until it is closed; return `False` if it is locked, or cannot be."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_left(folder: Path, own: str) -> None:
+    """Remove the temporary files of a target whose writers were killed: they have no lock."""
+    with suppress(OSError):
+        left = [name for name in os.listdir(folder) if name.startswith(own) and is_temporary(name)]
+        for name in left:
+            path = folder / name
+            with suppress(OSError), path.open("rb") as file:
+                is_young = time() - os.fstat(file.fileno()).st_mtime < _YOUNG_S
+                if not is_young and _lock(file.fileno()):
+                    path.unlink()
 
 
 def is_temporary(name: str) -> bool:
