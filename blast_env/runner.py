@@ -1,9 +1,13 @@
 """Independent pieces of work in parallel, on this machine or on a cluster (`on_cluster`)."""
 
+import os
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from functools import partial
-from typing import Any, Literal, TypeVar, overload
+from functools import cache, partial
+from threading import Thread
+from time import sleep
+from typing import Any, Final, Literal, TypeVar, overload
 
 import joblib
 
@@ -11,6 +15,8 @@ from blast_env.errors import BlastEnvError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+_WATCH_S: Final = 1.0
 
 ProgressCallback = Callable[[float], None]
 """A callback for the finished share of some work, 0 to 1."""
@@ -108,6 +114,25 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
     return index, function(item)
 
 
+def _watched(function: Callable[[Any], Any], parent: int, host: str, item: Any) -> Any:
+    """Do an item in a worker, which ends with the process that started it."""
+    if os.getppid() == parent and socket.gethostname() == host:
+        _end_with(parent)
+    return function(item)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """End this process when its parent, a process that may have been killed, has ended."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(_WATCH_S)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
 def _processes(workers: int, items: int) -> int:
     """Return the number of processes for the work; 1 for this process alone."""
     return max(min(max(workers, configured_workers()), items), 1)
@@ -120,8 +145,9 @@ def _parallel(
     return_as: Literal["generator", "generator_unordered"],
 ) -> Iterator[Any]:
     parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
+    watched = partial(_watched, function, os.getpid(), socket.gethostname())
     try:
-        yield from parallel(joblib.delayed(function)(item) for item in items)
+        yield from parallel(joblib.delayed(watched)(item) for item in items)
     except BrokenExecutor as error:
         raise BlastEnvError(
             "a worker process has ended, for lack of memory or because it was killed; results so "
