@@ -1,8 +1,11 @@
 """Results of long work by their keys, in a database that several processes and threads may use."""
 
 import os
+import shutil
 import sqlite3
+import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from threading import RLock
@@ -19,6 +22,9 @@ _FORMAT: Final = 0x62_6C_73_31
 
 _PATIENCE_S: Final = 60.0
 _MOST_CONTENT_BYTES: Final = 2**28
+_HEADER_BYTES: Final = 100  # of an SQLite database
+_LOOKS: Final = 10
+_FULL_BYTES: Final = 2**16
 _KEPT_SHARE: Final = 0.9  # of the bound, after deleting: not every addition tidies up again
 _UNSEEN_SHARE: Final = 1.0 / 32.0
 
@@ -57,7 +63,10 @@ class Store:
         self.damaged = 0
         self._unseen_bytes = most_bytes or 0  # the size is not known yet
         make_folder(self.path.parent)
+        is_cut = _is_cut(self.path)
         self._run("SELECT 1")
+        if is_cut:
+            self._note("has lost its content: all of it counts as missing")
 
     def _begin(self) -> None:
         self._lock, self._process = RLock(), 0
@@ -141,10 +150,15 @@ class Store:
         """Count the entry of a key as damaged, and delete it."""
         self.damaged += 1
         self._run("DELETE FROM contents WHERE key = ?", key)
+        if self.damaged == 1:
+            self._note("has a damaged entry, which counts as missing and is deleted")
 
     def __len__(self) -> int:
         count: int = self._run("SELECT COUNT(*) FROM contents")[0][0]
         return count
+
+    def _note(self, words: str) -> None:
+        warnings.warn(f"{self.path}: {words}", RuntimeWarning, stacklevel=4)
 
     def _tidy_up(self, most_bytes: int) -> None:
         """Delete the oldest entries, if all together exceed the bound."""
@@ -166,6 +180,8 @@ class Store:
         except sqlite3.Error as error:
             damaged = type(error) is sqlite3.DatabaseError
             words = "is damaged, or no store of results: delete it" if damaged else "cannot be used"
+            if not damaged and _is_full(self.path.parent):
+                words = "cannot be written: the device is full"
             raise BlastEnvError(f"{self.path}: {words} ({error})") from error
 
     def _opened(self) -> sqlite3.Connection:
@@ -191,6 +207,24 @@ class Store:
             connection.close()
             raise
         return connection
+
+
+def _is_cut(path: Path) -> bool:
+    """Return whether a file is too short for a database, and nobody is just making one."""
+    for _ in range(_LOOKS):
+        with suppress(OSError):
+            if path.stat().st_size >= _HEADER_BYTES:
+                return False
+        if not path.exists() or any(path.parent.glob(f"{path.name}-*")):
+            return False
+        sleep(0.01)
+    return True
+
+
+def _is_full(folder: Path) -> bool:
+    with suppress(OSError):
+        return shutil.disk_usage(folder).free < _FULL_BYTES
+    return False
 
 
 def _use_log(connection: sqlite3.Connection) -> None:

@@ -3,7 +3,12 @@
 import multiprocessing
 import os
 import pickle
+import shutil
 import sqlite3
+import subprocess
+import sys
+import warnings
+from collections import namedtuple
 from contextlib import closing
 from itertools import count
 from multiprocessing.connection import Connection
@@ -130,7 +135,6 @@ def test_contents_come_back_for_another_object_and_a_copy(tmp_path: Path) -> Non
         assert list(store.items()) == [(f"key {k}", bytes([k]) * 2000) for k in range(3)]
 
 
-@pytest.mark.filterwarnings("error")
 def test_any_damage_is_an_error_or_a_missing_content_and_never_a_wrong_one(tmp_path: Path) -> None:
     path = tmp_path / "store"
     filled(path).__del__()  # which closes it, so that all of it is in one file
@@ -146,11 +150,14 @@ def test_any_damage_is_an_error_or_a_missing_content_and_never_a_wrong_one(tmp_p
             each.unlink()
         path.write_bytes(content)
         try:
-            store = Store(path)
-            found = [store.get(f"key {number}") for number in range(3)]
+            with warnings.catch_warnings(record=True) as notes:
+                warnings.simplefilter("always")
+                store = Store(path)
+                found = [store.get(f"key {number}") for number in range(3)]
         except BlastEnvError:
             refused += 1
         else:
+            assert len(notes) == (1 if store.damaged else 0)
             whole_or_none = zip(found, range(3), strict=True)
             assert all(each in (None, bytes([k]) * 2000) for each, k in whole_or_none)
     assert refused >= 3
@@ -162,7 +169,8 @@ def test_a_damaged_content_goes(tmp_path: Path) -> None:
         other.execute("UPDATE contents SET content = ? WHERE key = 'key 1'", (b"other",))
         other.execute("UPDATE contents SET key = 'key 9' WHERE key = 'key 2'")
         other.commit()
-    assert store.get("key 1") is None
+    with pytest.warns(RuntimeWarning, match="has a damaged entry"):
+        assert store.get("key 1") is None
     assert store.get("key 9") is None  # of another key
     assert store.damaged == 2
     assert len(store) == 1
@@ -172,7 +180,8 @@ def test_content_that_cannot_be_decoded_counts_as_damaged(tmp_path: Path) -> Non
     store = Store(tmp_path / "store")
     store.put("key", b"3.5")
     assert store.read("key", float) == 3.5
-    assert store.read("key", int) is None
+    with pytest.warns(RuntimeWarning, match="has a damaged entry"):
+        assert store.read("key", int) is None
     assert store.damaged == 1
     assert store.read("key", float) is None
 
@@ -267,3 +276,77 @@ def test_a_killed_process_leaves_all_that_it_had_put_and_nothing_half_written(
         for number in range(last + 1):
             assert store.get(str(number)) == bytes([number % 256]) * 3000
         assert (len(store) - last, store.damaged) in ((1, 0), (2, 0))
+
+
+def killed_writer(target: Path) -> Path:
+    """Return the temporary file that a writer of a file leaves when it is killed."""
+    code = (
+        "import os, signal, sys\n"
+        "from blast_env.files import write_atomically\n"
+        "with write_atomically(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    before = set(target.parent.iterdir())
+    subprocess.run([sys.executable, "-c", code, str(target)], check=False)
+    (left,) = set(target.parent.iterdir()) - before
+    assert is_temporary(left.name)
+    os.utime(left, (0.0, 0.0))
+    return left
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="without locks of files")
+def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+    left, of_another = killed_writer(tmp_path / "a.gif"), killed_writer(tmp_path / "b.gif")
+    with write_atomically(tmp_path / "a.gif") as first:
+        os.utime(first, (0.0, 0.0))
+        with write_atomically(tmp_path / "a.gif") as second:
+            assert first.exists()  # its writer lives
+            second.write_text("second")
+        first.write_text("first")
+    assert not left.exists()
+    assert of_another.exists()
+    assert (tmp_path / "a.gif").read_text() == "first"
+
+
+@pytest.mark.parametrize("content", [b"", b"S"])
+def test_a_store_that_has_lost_its_content_says_so_once(content: bytes, tmp_path: Path) -> None:
+    Store(tmp_path / "a.sqlite").put("key", b"content")
+    for path in tmp_path.iterdir():
+        path.unlink()
+    (tmp_path / "a.sqlite").write_bytes(content)
+    with pytest.warns(RuntimeWarning, match=r"a\.sqlite: has lost its content") as notes:
+        store = Store(tmp_path / "a.sqlite")
+    assert len(notes) == 1
+    assert store.get("key") is None
+    store.put("key", b"content")
+    assert Store(tmp_path / "a.sqlite").get("key") == b"content"
+
+
+def test_damaged_entries_are_one_note(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    for key in "abc":
+        store.put(key, b"content")
+    with closing(sqlite3.connect(tmp_path / "a.sqlite")) as other:
+        other.execute("UPDATE contents SET content = x'00' WHERE key != 'c'")
+        other.commit()
+    with pytest.warns(RuntimeWarning, match=r"a\.sqlite: has a damaged entry") as notes:
+        assert [store.get(key) for key in "abc"] == [None, None, b"content"]
+    assert (len(notes), store.damaged) == (1, 2)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="without limits of files")
+def test_a_full_device_is_named_as_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Store(tmp_path / "a.sqlite")
+    with (
+        file_size_limit(1000),
+        pytest.raises(BlastEnvError, match=r"a\.sqlite: cannot be used"),
+    ):
+        store.put("key", bytes(100_000))
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**6, 10**6, 0))
+    with (
+        file_size_limit(1000),
+        pytest.raises(BlastEnvError, match=r"a\.sqlite: cannot be written: the device is full"),
+    ):
+        store.put("key", bytes(100_000))
