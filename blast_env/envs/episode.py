@@ -239,11 +239,16 @@ class Episode:
         """Return the loads with the final layout and without a barrier."""
         return self.loads[self.transition.after], self.loads[()]
 
+    @cached_property
+    def no_outcome(self) -> Mapping[str, Any]:
+        """The information on the blasts before the end: loads and counts are 0."""
+        return self.site.no_outcome(len(self.case.threats) // self.case.realisations)
+
     @property
     def outcome(self) -> Mapping[str, Any]:
-        """The information on the blasts at the end; before, loads and counts are 0."""
+        """The information on the blasts."""
         if not self.ended:
-            return self.site.no_outcome(len(self.case.threats) // self.case.realisations)
+            return self.no_outcome
         charges = self.case.charges_against(self.transition.after)
         return _outcome(self.evaluator, *self.assess(), charges)
 

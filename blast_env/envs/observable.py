@@ -213,8 +213,10 @@ def items_placed(placements: Placements) -> Plane:
     for own in of_catalogues.values():
         variants = placements.rules[own[0]].catalogue.variants
         rows = [(height_share(each.height_m), each.stops_vehicles) for each in variants]
-        table = np.array([(0.0, 0.0), *rows], dtype=np.float32)
-        on_cells[own, :2] = np.moveaxis(table[placements.standing[own]], -1, 1)
+        tables = np.array([(0.0, 0.0), *rows], dtype=np.float32).T.copy()
+        which: slice | list[int] = slice(None) if len(own) == len(legal) else own
+        for plane, table in enumerate(tables):
+            on_cells[which, plane] = table.take(placements.standing[which], mode="clip")
     return on_cells
 
 

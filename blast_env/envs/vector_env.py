@@ -236,15 +236,18 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         arrays: dict[str, Any] = {
             "action_mask": self.episodes.masks(self._all),
             "invalid_actions": np.array([each.invalid_actions for each in running]),
-            "placed": layouts.table.sum(axis=(1, 2, 3), dtype=np.int64),
+            "placed": np.array([len(each) for each in layouts.layouts]),
             "layout": layouts.table.copy(),
         }
         for name in running[0].constants:
             arrays[name] = _objects([each.constants[name] for each in running])
-        outcomes = [each.outcome for each in running]
-        for name, first in outcomes[0].items():
-            values = [each[name] for each in outcomes]
-            arrays[name] = np.array(values) if isinstance(first, _NUMBERS) else _objects(values)
+        ended = [index for index, each in enumerate(running) if each.ended]
+        outcomes = {index: running[index].outcome for index in ended}
+        for name, first in running[0].no_outcome.items():
+            own = _like(first, [each.no_outcome[name] for each in running])
+            for index in ended:
+                own[index] = outcomes[index][name]
+            arrays[name] = own
         terms = {name: np.array([each.terms[name] for each in running]) for name in names}
         for values in (*arrays.values(), *terms.values()):
             values[~known] = None if values.dtype == object else 0
@@ -253,6 +256,13 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 
 
 _NUMBERS: Final = (bool, int, float)
+
+
+def _like(first: Any, values: Sequence[Any]) -> NDArray[Any]:
+    """Return values before the end in an array: numbers are 0, others objects."""
+    if isinstance(first, _NUMBERS):
+        return np.zeros(len(values), dtype=type(first))
+    return _objects(values)
 
 
 def _objects(values: Sequence[Any]) -> NDArray[np.object_]:

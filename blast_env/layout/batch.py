@@ -28,6 +28,7 @@ class PlacementRules:
         dearest: The largest of these costs at a place that is legal on the empty site.
         sizes: Rows and columns of each variant; 0 and 0 of a measure.
         passable: Cells that are free of structures (rows, columns).
+        overlapping: Each variant that covers cells, with its rows and columns less one.
     """
 
     scenario: Scenario
@@ -37,6 +38,7 @@ class PlacementRules:
     dearest: float
     sizes: tuple[tuple[int, int], ...]
     passable: BoolArray
+    overlapping: tuple[tuple[int, int, int], ...]
     _elements: dict[int, Element] = field(default_factory=dict, init=False, repr=False)
 
     def element(self, number: int) -> Element:
@@ -52,8 +54,12 @@ class PlacementRules:
         scenario, catalogue = start.scenario, start.catalogue
         sizes = tuple((each.rows, each.columns) for each in catalogue.variants)
         dearest = float(start.costs[start.fits].max(initial=0.0))
+        overlapping = tuple(
+            (number, rows - 1, columns - 1) for number, (rows, columns) in enumerate(sizes) if rows
+        )
         return cls(
-            *(scenario, scenario.zone, catalogue, start.costs, dearest, sizes, start.passable)
+            *(scenario, scenario.zone, catalogue, start.costs, dearest, sizes, start.passable),
+            overlapping,
         )
 
 
@@ -120,10 +126,10 @@ class LayoutBatch:
         high, wide = rules.sizes[variant]
         if high:
             self.standing[index, row : row + high, column : column + wide] = variant + 1
-            for other, (up, right) in enumerate(rules.sizes):
-                if up:
-                    first, start = max(0, row - up + 1), max(0, column - right + 1)
-                    legal[other, first : row + high, start : column + wide] = False
+            above, beyond = row + high, column + wide
+            for other, up, right in rules.overlapping:
+                first, start = row - up, column - right
+                legal[other, max(first, 0) : above, max(start, 0) : beyond] = False
         variants = rules.catalogue.variants
         item = variants[variant].item
         left[0] -= 1

@@ -277,6 +277,19 @@ def _product(rows: SingleArray, weights: SingleArray) -> SingleArray:
         of_member = weights[member]
         for row in range(rows.shape[1]):
             given = rows[member if len(rows) > 1 else 0, row]
+            if outputs == 1:  # the same sum, without a loop over outputs
+                single = np.float32(0.0)
+                for each in range(0, whole, 4):
+                    single += (
+                        given[each] * of_member[each, 0] + given[each + 1] * of_member[each + 1, 0]
+                    ) + (
+                        given[each + 2] * of_member[each + 2, 0]
+                        + given[each + 3] * of_member[each + 3, 0]
+                    )
+                for each in range(whole, inputs):
+                    single += given[each] * of_member[each, 0]
+                found[member, row, 0] = single
+                continue
             total = found[member, row]
             for each in range(0, whole, 4):  # four at once: the sums stay in registers
                 a, b, c, d = given[each], given[each + 1], given[each + 2], given[each + 3]
