@@ -25,6 +25,8 @@ _THIN_M: Final = 0.5 * LEAST_STOREY_M
 _ROUNDING_M: Final = 0.05
 _LEAST_M2: Final = 0.01
 _HALF: Final = 0.5
+_HAIR_M: Final = 1e-3
+_MITRE: Final = 1.5  # a right angle has 1.41
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ class Faces:
         """Return the faces with these corners, (n, 3, 3)."""
         plans = np.asarray(shapely.polygons(corners_m[:, :, :2]), dtype=object)
         flat = shapely.area(plans) <= _LEAST_FACE_M2
-        plans[flat] = shapely.linestrings(corners_m[flat][:, [0, 1, 2, 0], :2])
+        sides = np.stack([corners_m[flat], np.roll(corners_m[flat], -1, axis=1)], axis=2)[..., :2]
+        longest = np.hypot(*np.diff(sides, axis=2)[:, :, 0].transpose(2, 0, 1)).argmax(axis=1)
+        plans[flat] = shapely.linestrings(sides[np.arange(len(sides)), longest])
         return cls(plans, corners_m[:, :, 2].min(axis=1), corners_m[:, :, 2].max(axis=1))
 
     @classmethod
@@ -124,10 +128,10 @@ class Faces:
                 if base_m is None:
                     stands = shapely.union(stands, piece)
                 elif not is_thin:
-                    found.append(BodyPart(piece, base_m, top_m))
+                    found.append(BodyPart(_apart(piece), base_m, top_m))
             stands = areas_of(stands)
             if stands.area > _LEAST_M2:
-                found.append(BodyPart(stands, ground_m, top_m))
+                found.append(BodyPart(_apart(stands), ground_m, top_m))
         return found
 
     def _levels(self, above_m: float, least_m2: float) -> Iterator[tuple[BaseGeometry, float]]:
@@ -185,7 +189,8 @@ def _plan(corners_m: FloatArray) -> BaseGeometry:
         return area
     if area.area > _LEAST_FACE_M2:
         return areas_of(shapely.make_valid(area))
-    return shapely.MultiPoint(corners_m).convex_hull
+    first = corners_m[np.hypot(*(corners_m - corners_m[0]).T).argmax()]
+    return shapely.LineString([first, corners_m[np.hypot(*(corners_m - first).T).argmax()]])
 
 
 def _closed(shape: BaseGeometry) -> BaseGeometry:
@@ -194,11 +199,21 @@ def _closed(shape: BaseGeometry) -> BaseGeometry:
     return areas_of(shapely.buffer(wider, -0.5 * _GAP_M, join_style="mitre"))
 
 
+def _apart(shape: BaseGeometry) -> BaseGeometry:
+    """Return a shape without places where it meets itself, which rounding would make a crossing."""
+    inner = shapely.buffer(shape, -_HAIR_M, join_style="mitre")
+    return areas_of(shapely.buffer(inner, _HAIR_M, join_style="mitre"))
+
+
 def enclosed(feet: Sequence[BaseGeometry]) -> BaseGeometry:
     """Return the areas that walls and posts enclose; doors and gaps to two storeys are closed."""
-    wide = shapely.union_all(
-        shapely.buffer(list(feet), LEAST_STOREY_M, join_style="mitre", cap_style="square")
-    )
+    plans = np.array([*feet], dtype=object)
+    is_area = shapely.get_dimensions(plans) == 2
+    areas = shapely.union_all(plans[is_area], grid_size=_GRID_M)
+    lines = shapely.buffer(plans[~is_area], LEAST_STOREY_M, join_style="mitre", cap_style="square")
+    # A long mitre, as at the tip of a triangle, would reach across a passage.
+    around = shapely.buffer(areas, LEAST_STOREY_M, join_style="mitre", mitre_limit=_MITRE)
+    wide = shapely.union_all([around, *lines])
     parts = shapely.get_parts(wide)
     filled = shapely.union_all(shapely.polygons(shapely.get_exterior_ring(parts)))
     return shapely.buffer(filled, -LEAST_STOREY_M, join_style="mitre")

@@ -77,6 +77,11 @@ class Solid:
         """The area below it."""
         return self.faces.shadow
 
+    @property
+    def feet(self) -> list[BaseGeometry]:
+        """Its area and its vertical faces in plan."""
+        return [self.shadow, *self.faces.plans[~self.faces.is_area]]
+
     @cached_property
     def sides_m(self) -> tuple[float, float]:
         """Its longer and shorter side in plan, m."""
@@ -251,7 +256,7 @@ class Building:
             return []
         limit_m = self.ground_m + LEAST_STOREY_M
         feet = [each for each in self.solids if each.low_m <= limit_m < each.high_m]
-        plans = [plan for each in feet for plan in (each.shadow, *each.faces.plans)]
+        plans = [plan for each in feet for plan in each.feet]
         faces = Faces.joined(each.faces for each in walls)
         parts = faces.parts(self.ground_m, plans, self.options.least_area_m2)
         if parts or self._shadow.is_empty:
