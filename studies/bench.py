@@ -203,7 +203,7 @@ class SiteCost:
         cells: Growth of its cells; see `GasSettings`.
         estimate: Estimate of the cost before the run.
         steps: Number of steps.
-        cell_updates: Cell updates; a step counts as two.
+        cell_updates: Cell updates, one per cell and step.
         cpu_s: Processor time, from scenario to loads.
         memory_mb: Peak memory of the process.
     """

@@ -32,7 +32,7 @@ _AFTER_S: Final = 0.01
 _PARTS: Final = 100
 """Number of intervals of a run in which updated cells are counted."""
 
-_CELLS_PER_S: Final = 15e6
+_CELLS_PER_S: Final = 35e6
 _BYTES_PER_CELL: Final = 28.0
 _PROCESS_BYTES: Final = 270e6
 _DRAWING_S: Final = 2.5

@@ -39,24 +39,29 @@ class Faces:
         middle = 0.5 * (self.air + self.solid) + 0.5
         return np.asarray(grid.origin_m) + grid.cell_m * middle
 
-    def kernel_table(self, grid: GasGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the faces in the order of the kernels, line by line.
+    def kernel_table(
+        self, grid: GasGrid, shape: tuple[int, int, int], lanes: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the faces in the order of the kernels, vector by vector of cells along x.
 
-        A face is indexed by the cell on its high side. A line is a row of cells along x. Lines of
-        faces normal to x come first, then those normal to y and z.
+        A face is indexed by the cell on its high side. Vectors of faces normal to x come first,
+        then those normal to y and z.
 
         Args:
             grid: The grid.
+            shape: Cells of the kernels' arrays along z, y and x.
+            lanes: Number of cells in a vector.
 
         Returns:
-            Cell along x and index of the face (n, 2); first entry of each line (lines + 1,).
+            Lane of the cell and index of the face (n, 2); first entry of each vector, and the end.
         """
-        nx, ny, nz = grid.array_shape
+        nz, ny, nx = shape
         high = np.maximum(self.air, self.solid) + grid.lead
-        line = (self.axis * nz + high[:, 2]) * ny + high[:, 1]
-        order = np.argsort(line * nx + high[:, 0], kind="stable")
-        table = np.stack((high[order, 0], order), axis=1).astype(np.int32)
-        first = np.searchsorted(line[order], np.arange(3 * nz * ny + 1)).astype(np.int32)
+        place = ((self.axis * nz + high[:, 2]) * ny + high[:, 1]) * nx + high[:, 0]
+        order = np.argsort(place, kind="stable")
+        table = np.stack((place[order] % lanes, order), axis=1).astype(np.int32)
+        vectors = np.arange(3 * nz * ny * nx // lanes + 1)
+        first = np.searchsorted(place[order] // lanes, vectors).astype(np.int32)
         return np.ascontiguousarray(table), first
 
 

@@ -66,7 +66,7 @@ def cool(state: Reals, extent: NDArray[np.int64], hottest: Any) -> None:
 def fastest_signal(state: Reals) -> float:
     """Return the largest signal speed, which limits the time step.
 
-    It is the speed of sound plus the speed along z, or the mean of those along x and y.
+    It is the speed of sound plus the largest speed along an axis.
     """
     fastest = 0.0
     for z in range(state.shape[1]):
@@ -78,8 +78,61 @@ def fastest_signal(state: Reals) -> float:
                 w = state[Z_MOMENTUM, z, y, x] / density
                 inner = state[ENERGY, z, y, x] / density - 0.5 * (u * u + v * v + w * w)
                 sound = sqrt(GAMMA * (GAMMA - 1.0) * inner)
-                fastest = max(fastest, 0.5 * (abs(u) + abs(v)) + sound, abs(w) + sound)
+                fastest = max(fastest, max(abs(u), abs(v), abs(w)) + sound)
     return fastest
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def widen(extent: NDArray[np.int64], whole: NDArray[np.int64], axis: int) -> None:
+    """Extend an extent along an axis by the range of a sweep, one cell.
+
+    Slopes vanish in a cell of still air beside another one, so that nothing flows between them.
+
+    Args:
+        extent: First and last + 1 cells along y and x of each plane; updated in place (z, 4).
+        whole: The extent of the grid (z, 4).
+        axis: The axis, 0 for x.
+    """
+    if axis < 2:
+        low = 2 * (1 - axis)
+        for z in range(len(extent)):
+            if extent[z, 1] > 0:
+                extent[z, low] = max(extent[z, low] - 1, whole[z, low])
+                extent[z, low + 1] = min(extent[z, low + 1] + 1, whole[z, low + 1])
+        return
+    below = np.zeros(4, dtype=np.int64)
+    here = extent[0].copy()
+    for z in range(1, len(extent) - 1):
+        below[:], here[:] = here, extent[z]
+        if whole[z, 1] == 0:
+            continue
+        for other in (below, extent[z + 1]):
+            if other[1] > 0 and extent[z, 1] > 0:
+                for low in (0, 2):
+                    extent[z, low] = min(extent[z, low], other[low])
+                    extent[z, low + 1] = max(extent[z, low + 1], other[low + 1])
+            elif other[1] > 0:
+                extent[z] = other
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def layers_of(extent: NDArray[np.int64], axis: int) -> tuple[int, int, int]:
+    """Return the first layer of cells that a sweep moves, the last + 1, and the number of cells.
+
+    Layers are planes, and for a sweep along z rows in all planes.
+
+    Args:
+        extent: First and last + 1 cells along y and x of each plane (z, 4).
+        axis: The axis, 0 for x.
+    """
+    first, end, cells = -1, 0, 0
+    for z in range(len(extent)):
+        y0, y1, x0, x1 = extent[z]
+        if y1 > 0:
+            low, high = (y0, y1) if axis == 2 else (z, z + 1)
+            first, end = low if first < 0 else min(first, low), max(end, high)
+            cells += (y1 - y0) * (x1 - x0)
+    return max(first, 0), end, cells
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)

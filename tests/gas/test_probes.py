@@ -256,7 +256,7 @@ GRID = GasGrid(0.5, AIR, origin_m=(1.0, 2.0, 0.0))
         (lambda: GRID.cell_at((3.1, 2.0, 0.0)), "x = 3.1 m is outside the grid, 1.0 to 3.0 m"),
         (lambda: GasSolver(GRID, precision=WRONG), "precision is 'wall'"),
         (lambda: GasSolver(GRID, threads=0), "threads is 0, but must be at least 1"),
-        (lambda: GasSolver(GRID, courant=0.6), "courant is 0.6, but must be above 0"),
+        (lambda: GasSolver(GRID, courant=1.1), "courant is 1.1, but must be above 0"),
         (lambda: GasSolver(GRID, pressure_pa=0.0), "0.0 Pa"),
         (lambda: GasSolver(GRID, burning=Burning(1.0, 1.0)), "needs with_fuel=True"),
         (lambda: GasSolver(GRID, settling=Settling(0.1, 1.0)), "hottest is 1.0, but must be above"),

@@ -120,7 +120,7 @@ class GasEngine(GasSettings, Engine):
     medium: ClassVar[Literal["", "gas", "particles"]] = "gas"
 
     name: str = "gas"
-    version: str = f"gas 6 (numba {version('numba')})"
+    version: str = f"gas 7 (numba {version('numba')})"
 
     def blast(
         self,
