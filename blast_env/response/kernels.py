@@ -87,14 +87,22 @@ def integrate(
 ) -> None:
     """Integrate one system until it rebounds; write the fields of `Responses` to `out`.
 
-    Ends at the first step after `least_steps` at which the system moves back towards 0.
+    Ends at the first step after `least_steps` at which the system moves back towards 0. A step n of
+    m x'' + r(x) = p(t), with speeds at the middles of steps and I the impulse of the load:
+
+    1. x_n = x_(n-1) + dt v_(n-1/2);
+    2. r(x_n): on the second polyline after cracking; else on the first one from the plastic
+       deflection on, which grows as far as r exceeds the yield resistance;
+    3. v_(n+1/2) = v_(n-1/2) + (I(t_n + dt / 2) - I(t_n - dt / 2) - dt r) / m;
+    4. the extremes, and the end.
     """
     x, offset, is_cracked = 0.0, 0.0, 0.0
     largest, resistance = 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
     v = pushed / mass
     for step in range(1, _MOST_TIMES * least_steps):
-        x += step_s * v
+        x += step_s * v  # 1.
+        # 2. The resistance.
         if abs(x) > crack:
             is_cracked = 1.0
         if is_cracked:
@@ -110,8 +118,9 @@ def integrate(
                 resistance = -rebound_cap * grown
         now_s = time_s[0] + step * step_s
         until, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, now_s + 0.5 * step_s)
-        v += (until - pushed - step_s * resistance) / mass
+        v += (until - pushed - step_s * resistance) / mass  # 3.
         pushed = until
+        # 4. The extremes, and the end.
         largest = max(largest, resistance)
         if x > out[0]:
             out[0], out[2] = x, now_s
@@ -146,6 +155,11 @@ def bend(
     deflection of the strongest of a hundred panes until it breaks. Slopes are those of the
     segments before the points; the damage to the power `exponent` is the risk B. The pane breaks at
     the risk `strength`; if that is 0, as the median of the panes that break.
+
+    1. Each step: deflection and speed as in `integrate`, without plasticity.
+    2. Its damage: duration times the rate at that deflection, linear in logarithms; the sum is D.
+    3. The risk B = D^exponent; the share of panes that break is 1 - exp(-B).
+    4. Breakage: the first step at which B reaches the strength, and the impulse still to come.
     """
     x, damage, peak = 0.0, 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
@@ -153,6 +167,7 @@ def bend(
     track, per_step = np.empty((3, steps)), step_s / 60.0
     bent, worn = 1, 1  # segments of the two polylines, which change little between steps
     for step in range(steps):
+        # 1. Deflection and speed.
         x += step_s * v
         at_s = time_s[0] + (step + 1) * step_s
         now, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, at_s + 0.5 * step_s)
@@ -163,12 +178,14 @@ def bend(
         v += (now - pushed - step_s * resistance) / mass
         pushed = now
         peak = max(peak, x)
+        # 2. Damage.
         if x != 0.0:
             log_x = np.log(abs(x))
             worn = end_of_segment(log_points, log_x, worn)
             rate = log_rate[worn] + log_slopes[worn] * (log_x - log_points[worn])
             damage += per_step * np.exp(rate)
         track[0, step], track[1, step], track[2, step] = damage, x, v
+    # 3. and 4. The share that breaks, and when.
     share = -np.expm1(-(damage**exponent))
     risk = strength if strength > 0.0 else -np.log1p(-0.5 * share)
     broken = min(np.searchsorted(track[0], risk ** (1.0 / exponent)), steps - 1)

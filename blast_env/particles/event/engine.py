@@ -73,6 +73,16 @@ def run_until(
 ) -> int:
     """Continue until a time, or until the caller has to act.
 
+    Event-driven dynamics of hard discs (Alder & Wainwright, J. Chem. Phys. 31 (1959) 459): between
+    events all balls move straight, and each keeps its position at its own last event. An event:
+
+    1. stop, if a bound is reached or no moving ball can reach a structure;
+    2. take the earliest event from the heap;
+    3. at the border of a cell, change the cell and predict again;
+    4. a partner that has collided since the prediction makes it stale: predict again;
+    5. apply the rules of the contact, and record it if it loads a module;
+    6. predict the next events of the balls concerned; all others stay valid.
+
     Returns:
         The reason, one of the constants above.
     """
@@ -85,6 +95,7 @@ def run_until(
     progress.stage = RUNNING
     events = 0
     while True:
+        # 1. Bounds.
         if events == _EVENTS_PER_CALL:
             return PAUSED
         events += 1
@@ -100,14 +111,18 @@ def run_until(
             return OUT_OF_REACH  # no further event
         if heap[1].time_s > until_s:
             return UNTIL
+        # 2. The earliest event, the root of the heap.
         ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
+        # 3. A change of cell.
         if balls[ball].contact_s > time_s:
             cross(balls, cells, heap, surfaces, rules, ball)
             continue
         partner = _NUMBER(balls[ball].partner)
+        # 4. A stale prediction.
         if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
             look_ahead(balls, cells, heap, surfaces, rules, ball)
             continue
+        # 5. and 6. The contact, and the next events of those that it changed.
         progress.collisions += 1
         progress.time_s = time_s
         if partner >= 0:

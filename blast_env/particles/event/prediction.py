@@ -170,7 +170,11 @@ def border_touch_s(ball: Record, rules: Record) -> float:
 def _until_distance(
     x: float, y: float, vx: float, vy: float, distance: float, rules: Record
 ) -> float:
-    """Return the time until the length of (x, y) + (vx, vy) t has decreased to a distance."""
+    """Return the time until the length of (x, y) + (vx, vy) t has decreased to a distance.
+
+    With r = (x, y), v = (vx, vy), b = r v, c = r^2 - d^2, |r + v t| = d is v^2 t^2 + 2 b t + c = 0;
+    the balls touch at its smaller root t = c / (sqrt(b^2 - v^2 c) - b), if b < 0.
+    """
     falling = x * vx + y * vy
     if falling >= 0.0:
         return inf
