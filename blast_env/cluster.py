@@ -5,6 +5,7 @@ or whose scheduler has gone, and submits no more work than the workers present a
 """
 
 import asyncio
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
@@ -33,6 +34,17 @@ _UNDER_WAY: Final = 500
 _OWN: Final = ("blast_env", "blast_agents")
 _OTHERS: Final = ("numba", "numpy", "pymoo", "pymunk", "scipy")
 """Packages on which the bits of a result may depend."""
+
+
+_OF_THE_CONNECTION: Final = (
+    "distributed.batched",
+    "distributed.client",
+    "distributed.comm",
+    "distributed.core",
+    "distributed.utils",
+    "tornado.application",
+)
+"""Loggers that report a lost connection with tracebacks, which an error says already."""
 
 
 class ClusterSize(NamedTuple):
@@ -68,12 +80,35 @@ def on_cluster(address: str | Path) -> Iterator[ClusterSize]:
             is lost, or the same piece of work has killed several workers in turn.
     """
     client = _connect(str(address))
+    with _silent(_OF_THE_CONNECTION):
+        try:
+            size = _size(client)
+            with joblib.parallel_config(backend=ClusterBackend(client), n_jobs=-1):
+                yield size
+        finally:
+            client.close(timeout=_CONNECT_S)
+
+
+def _size(client: "Client") -> ClusterSize:
     try:
         threads = client.ncores()
-        with joblib.parallel_config(backend=ClusterBackend(client), n_jobs=-1):
-            yield ClusterSize(len(threads), sum(threads.values()))
+    except OSError as error:
+        raise _lost() from error
+    return ClusterSize(len(threads), sum(threads.values()))
+
+
+@contextmanager
+def _silent(names: Sequence[str]) -> Iterator[None]:
+    """Let loggers be silent in this block."""
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
     finally:
-        client.close(timeout=_CONNECT_S)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _connect(address: str) -> "Client":
@@ -158,8 +193,7 @@ class ClusterBackend(ParallelBackendBase):
 
     def effective_n_jobs(self, n_jobs: int | None) -> int:  # noqa: ARG002
         """Return the number of pieces of work to keep submitted; `n_jobs` does not change it."""
-        threads: int = sum(self._client.ncores().values())
-        return max(2 * threads, _UNDER_WAY)
+        return max(2 * _size(self._client).threads, _UNDER_WAY)
 
     def start_call(self) -> None:
         """Start a thread that fetches results until `stop_call`."""
@@ -234,14 +268,18 @@ def _known(error: BaseException) -> BaseException:
             f"of memory or because they were killed; the last one was {error.last_worker.address}"
         )
     elif isinstance(error, CancelledError | CommClosedError):
-        reworded = BlastEnvError(
-            "cluster: the connection to the scheduler was lost; results so far are kept if the "
-            "command has a folder for them, and the same command resumes"
-        )
+        reworded = _lost()
     else:
         return error
     reworded.__cause__ = error
     return reworded
+
+
+def _lost() -> BlastEnvError:
+    return BlastEnvError(
+        "cluster: the connection to the scheduler was lost; results so far are kept if the "
+        "command has a folder for them, and the same command resumes"
+    )
 
 
 def _do(work: Callable[[], Any], origin: str) -> Any:

@@ -1,13 +1,17 @@
 """Independent pieces of work in parallel, on this machine or on a cluster (`on_cluster`)."""
 
 import os
+import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
 from functools import cache, partial
+from multiprocessing import resource_tracker
 from threading import Thread
 from time import sleep
 from typing import Any, Final, Literal, TypeVar, overload
+from warnings import catch_warnings, simplefilter
 
 import joblib
 
@@ -133,6 +137,25 @@ def _end_with(parent: int) -> None:
     Thread(target=watch, daemon=True).start()
 
 
+@contextmanager
+def _uninterrupted_workers() -> Iterator[None]:
+    """Keep SIGINT from the processes that this thread starts in the block, and from their own.
+
+    A terminal sends Ctrl-C to all processes of a command, and a worker that is importing would
+    print a traceback. This process alone is interrupted, after the block, and ends its workers. On
+    Windows, where a thread cannot block a signal, the block does nothing.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # in the block, Python 3.11 would lift the mask to start it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _processes(workers: int, items: int) -> int:
     """Return the number of processes for the work; 1 for this process alone."""
     return max(min(max(workers, configured_workers()), items), 1)
@@ -147,7 +170,17 @@ def _parallel(
     parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
     watched = partial(_watched, function, os.getpid(), socket.gethostname())
     try:
-        yield from parallel(joblib.delayed(watched)(item) for item in items)
+        with _uninterrupted_workers():
+            found = parallel(joblib.delayed(watched)(item) for item in items)
+        try:
+            for result in found:  # noqa: UP028  # `yield from` would close with the warning
+                yield result
+        except BaseException:
+            with catch_warnings():
+                # It advises whoever stops, as Ctrl-C does, to ask for less work.
+                simplefilter("ignore", UserWarning)
+                found.close()
+            raise
     except BrokenExecutor as error:
         raise BlastEnvError(
             "a worker process has ended, for lack of memory or because it was killed; results so "

@@ -1,5 +1,6 @@
 """A cluster gives what one process gives, whatever happens to its workers."""
 
+import logging
 import os
 import re
 import subprocess
@@ -103,8 +104,7 @@ def test_a_stop_leaves_out_what_has_not_begun(
     with on_cluster(two.file):
         results = as_completed(Touch(tmp_path), range(200))
         next(results)
-        with pytest.warns(UserWarning, match="tasks which were still being"):
-            results.close()  # type: ignore[attr-defined]
+        results.close()  # type: ignore[attr-defined]
         run_all(square, range(2))  # comes after what had begun
         begun = len(list(tmp_path.iterdir()))
         run_all(square, range(2))
@@ -172,13 +172,42 @@ def test_work_that_kills_its_workers_is_given_up() -> None:
         backend.retrieve_result_callback(cluster._Outcome(error=error))
 
 
-def test_a_lost_scheduler_is_an_error(tmp_path: Path) -> None:
-    """And not a wait without end."""
+def test_a_lost_scheduler_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And not a wait without end, nor do tracebacks of Dask come before it."""
+    monkeypatch.setattr(logging.getLogger("distributed"), "propagate", True)
+    lost = "the connection to the scheduler was lost"
     with dask(tmp_path, workers=0) as (started, scheduler), on_cluster(started.file) as size:
         assert size == (0, 0)
         Timer(0.2, scheduler.kill).start()
-        with pytest.raises(BlastEnvError, match="the connection to the scheduler was lost"):
+        with pytest.raises(BlastEnvError, match=lost):
             run_all(square, range(100))
+    assert caplog.text == ""
+
+
+def test_a_scheduler_that_is_lost_before_the_work_is_the_same_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "_CONNECT_S", 3.0)
+
+    def work_without(scheduler: subprocess.Popen[bytes], file: Path) -> None:
+        with on_cluster(file):
+            scheduler.kill()
+            scheduler.wait()
+            run_all(square, range(100))
+
+    with dask(tmp_path, workers=0) as (started, scheduler):
+        levels = _levels()
+        with pytest.raises(BlastEnvError, match="the connection to the scheduler was lost"):
+            work_without(scheduler, started.file)
+        assert _levels() == levels
+
+
+def _levels() -> dict[str, int]:
+    """Return the levels of all loggers."""
+    names = [*logging.root.manager.loggerDict]
+    return {name: logging.getLogger(name).level for name in names}
 
 
 @pytest.mark.parametrize(

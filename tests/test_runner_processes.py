@@ -1,4 +1,4 @@
-"""Worker processes end with the process that started them."""
+"""Worker processes end with the process that started them, and without a word."""
 
 import os
 import signal
@@ -22,6 +22,25 @@ def work(folder):
 if __name__ == "__main__":
     run_all(work, [sys.argv[1]] * 2, 2)
 """
+COMMAND = """
+import typer
+from blast_env.cli.command import ShellCommand
+from blast_env.runner import run_all
+
+def work() -> None:
+    run_all(abs, [1, 2], 2)
+
+app = typer.Typer()
+app.command(cls=ShellCommand)(work)
+app()
+"""
+START = """
+import os, sys, time
+
+if any("loky" in word and "popen" in word for word in sys.orig_argv):
+    open(os.path.join(os.environ["STARTED"], str(os.getpid())), "w").close()
+    time.sleep(600)
+"""
 PATIENCE_S = 120.0
 
 
@@ -41,6 +60,12 @@ def eventually(condition: Callable[[], bool]) -> None:
         time.sleep(0.1)
 
 
+def group_of(leader: int) -> list[int]:
+    """Return the running processes of a group."""
+    numbers = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
+    return [each for each in numbers if is_there(each) and os.getpgid(each) == leader]
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
 def test_workers_and_their_trackers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
@@ -52,12 +77,41 @@ def test_workers_and_their_trackers_end_when_their_parent_is_killed(tmp_path: Pa
     )
     try:
         eventually(lambda: len(list(started.iterdir())) == 2)
-        group = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
-        group = [each for each in group if is_there(each) and os.getpgid(each) == process.pid]
+        group = group_of(process.pid)
         assert {int(each.name) for each in started.iterdir()} < {*group}
         process.kill()
         process.wait()
         eventually(lambda: not any(map(is_there, group)))
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_command_whose_workers_are_starting_ends_in_one_line(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """Ctrl-C goes to all processes of a terminal; the workers are at their first import."""
+    (tmp_path / "sitecustomize.py").write_text(START)
+    started = tmp_path / "started"
+    started.mkdir()
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": paths, "STARTED": str(started)},
+    )
+    try:
+        eventually(lambda: len(list(started.iterdir())) == 2)
+        os.killpg(process.pid, number)
+        _, text = process.communicate(timeout=PATIENCE_S)
+        assert text == "interrupted: no file was left half-written\n"
+        assert process.returncode == 128 + number
+        eventually(lambda: not group_of(process.pid))
     finally:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
