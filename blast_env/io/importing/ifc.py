@@ -111,12 +111,14 @@ class _Model:
 
     def read(self) -> None:
         """Add the buildings, the walls of the site, and all else with the reason."""
-        chosen = [each for each in self._products if _is_any(each, (*_SHAPED, *_POSTS))]
-        solids = {each.element.id(): each for each in self._solids(chosen)}
+        windows = [each for each in self._model.by_type("IfcWindow") if not each.Representation]
+        panes = {part.id(): part for each in windows for part in _parts_of(each)}
+        chosen = {each.id(): each for each in self._products if _is_any(each, (*_SHAPED, *_POSTS))}
+        solids = {each.element.id(): each for each in self._solids([*(chosen | panes).values()])}
         owners = {each.id(): self._owner(each) for each in self._products}
         if not any(owners[key] for key in solids) and len(self._buildings) == 1:
             owners = dict.fromkeys(owners, self._buildings[0])  # all hangs at the site
-        used: set[int] = set()
+        used = set(self._join(windows, solids))
         reasons, grounds_m = dict[int, str](), list[float]()
         for entity in self._buildings:
             own = [each for key, each in solids.items() if owners[key] == entity]
@@ -148,6 +150,22 @@ class _Model:
                 is_post = not _is_any(element, _SHAPED)
                 yield Solid(element, self._place(element), is_post, Faces.of_triangles(triangles))
             more = iterator.next()
+
+    def _join(self, windows: list[Any], solids: dict[int, Solid]) -> Iterator[int]:
+        """Give windows without a shape those of their frames and panes; yield the ids of these."""
+        for window in windows:
+            parts = [each.id() for each in _parts_of(window) if each.id() in solids]
+            if not parts:
+                continue
+            place = self._place(window)
+            own = [solids.pop(each) for each in parts]
+            faces = Faces.joined(each.faces for each in own)
+            solids[window.id()] = Solid(window, place, is_post=False, faces=faces)
+            for each in own:
+                self._map.ledger.add(
+                    Fate.MERGED, "parts of windows", each.place, detail=f"of {place}"
+                )
+            yield from parts
 
     def _owner(self, element: Any) -> Any:
         """Return the building that holds an element, the only one those that nothing holds.
@@ -271,6 +289,12 @@ def _is_object(product: Any) -> bool:
 
 def _is_any(element: Any, kinds: Sequence[str]) -> bool:
     return any(map(element.is_a, kinds))
+
+
+def _parts_of(element: Any) -> list[Any]:
+    """Return the elements of which one is made, if any."""
+    links = getattr(element, "IsDecomposedBy", None) or ()
+    return [part for link in links for part in link.RelatedObjects if part.is_a("IfcElement")]
 
 
 def _container_of_wall(element: Any) -> Any:

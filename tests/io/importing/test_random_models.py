@@ -263,6 +263,25 @@ def lived_in(model: Model, draw: Any) -> None:
 
 
 @maker
+def window_of_parts(model: Model, draw: Any) -> None:
+    """A window without a shape of its own, as of a frame and a pane."""
+    (level,) = model.building([0.0])
+    model.walls(level, 0.0, (20.0, 10.0, 6.0))
+    model.slab(level, 0.0, (20.0, 10.0), 6.0)
+    window = model.box("IfcWindow", level, (0.0, 0.0, 0.0), (1.0, 0.1, 1.0), Fate.MERGED)
+    window.Representation = None
+    parts = [
+        model.box("IfcMember", level, (3.0, 0.0, 1.0), (0.1, 0.1, 2.0), Fate.MERGED),
+        model.box("IfcPlate", level, (3.1, 0.0, 1.0), (1.4, 0.1, 2.0), Fate.MERGED),
+    ]
+    for part in parts:
+        model.file.remove(part.ContainedInStructure[0])
+    model._whole(window, parts)
+    model.boxes.append((200.0, 0.0, 6.0))
+    model.panes.append((1, 1.5, 2.0))
+
+
+@maker
 def walls_of_the_site(model: Model, draw: Any) -> None:
     height = draw(st.integers(2, 12)) / 2.0
     left = LOT_M * model.lots
