@@ -17,12 +17,12 @@ from blast_env.provenance import package_version
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
     from blast_env.design.proposal import propose, search
     from blast_env.evaluation.cases import LoadCase, LoadCaseSet
-    from blast_env.evaluation.comparison import Evaluation
     from blast_env.evaluation.engines.contract import Engine
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.evaluation.engines.particles import Blast, BlastResult
     from blast_env.evaluation.engines.simulate import simulate
     from blast_env.evaluation.evaluate import evaluate_layout
+    from blast_env.evaluation.questions.reduction import Evaluation
     from blast_env.layout import LayoutState, load_layout, write_layout
     from blast_env.site import Scenario, load_scenario, save_scenario
     from blast_env.site.blast_site import Charge
@@ -36,7 +36,7 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "Engine": "blast_env.evaluation.engines.contract",
         "GasBlast": "blast_env.evaluation.engines.gas",
         "GasResult": "blast_env.evaluation.engines.gas",
-        "Evaluation": "blast_env.evaluation.comparison",
+        "Evaluation": "blast_env.evaluation.questions.reduction",
         "LayoutState": "blast_env.layout",
         "Scenario": "blast_env.site",
         "LoadCase": "blast_env.evaluation.cases",

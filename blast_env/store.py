@@ -177,8 +177,9 @@ class Store:
                 if self._connection is None or self._process != os.getpid():
                     self._connection, self._process = self._opened(), os.getpid()
                 return self._connection.execute(command, values).fetchall()
-        except sqlite3.Error as error:
-            damaged = type(error) is sqlite3.DatabaseError
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            # SQLite quotes a damaged schema, whose bytes Python may be unable to decode.
+            damaged = type(error) in (sqlite3.DatabaseError, UnicodeDecodeError)
             words = "is damaged, or no store of results: delete it" if damaged else "cannot be used"
             if not damaged and _is_full(self.path.parent):
                 words = "cannot be written: the device is full"

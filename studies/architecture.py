@@ -14,7 +14,8 @@ import typer
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from blast_env.cli.output import print_line, user_errors
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.plots import save_figure
 

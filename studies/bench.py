@@ -20,8 +20,9 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from blast_env.answers.terminal import print_line, print_table
 from blast_env.arrays import FloatArray
-from blast_env.cli.output import print_line, print_table, progress_bar, user_errors
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine, simulate

@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 import typer
 
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines import find_engine
 from blast_env.files import make_folder

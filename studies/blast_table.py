@@ -13,7 +13,8 @@ import numpy as np
 import typer
 
 from blast_env import load_scenario
-from blast_env.cli.output import print_line, user_errors
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, BlastStore, StructureLoad, draw_threats
 from blast_env.files import make_folder

@@ -19,9 +19,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import DesignProblem, layouts_by_rule
 from blast_env.errors import BlastEnvError, UnknownNameError

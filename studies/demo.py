@@ -18,12 +18,9 @@ import typer
 from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 
-from blast_env.cli.output import (
-    print_line,
-    print_table,
-    progress_bar,
-    user_errors,
-)
+from blast_env.answers.document import interval, percent
+from blast_env.answers.terminal import print_line, print_table
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -37,7 +34,6 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
-from blast_env.evaluation.answers import interval, percent
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
@@ -296,8 +292,7 @@ class AgentComparison:
         chosen = np.argmin([rule.loads.mean(axis=1) for rule in rules], axis=0).tolist()
         return replace(
             rules[0],
-            layouts=tuple(rules[each].layouts[case] for case, each in enumerate(chosen)),
-            blasts=tuple(rules[each].blasts[case] for case, each in enumerate(chosen)),
+            every=tuple(rules[number].every[case] for case, number in enumerate(chosen)),
         )
 
     @property

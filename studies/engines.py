@@ -12,9 +12,10 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
 from blast_env.runner import run_all

@@ -15,8 +15,8 @@ from blast_agents.training.environments import ThreatPool
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
-from blast_env.cli.output import print_line
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation.store import BlastStore

@@ -8,6 +8,7 @@ import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from blast_env.answers.terminal import print_line, print_table
 from blast_env.calibration import (
     PAPER_UFC_LABEL,
     LinearLaw,
@@ -15,13 +16,7 @@ from blast_env.calibration import (
     ScalingLaw,
     paper_table,
 )
-from blast_env.cli.output import (
-    print_line,
-    print_table,
-    print_written,
-    save_figures,
-    user_errors,
-)
+from blast_env.cli.output import print_written, save_figures, user_errors
 from blast_env.files import make_folder
 from blast_env.particles.paper import (
     CONTRADICTIONS,

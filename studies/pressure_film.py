@@ -9,7 +9,8 @@ from typing import Annotated, Final
 
 import typer
 
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import wall_near_building
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.plots.film import write_film

@@ -12,12 +12,13 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.curves import normally_reflected_pa, oblique, reflected_pa
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.screening import screen
+from blast_env.evaluation.questions.screening import screen
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.facade import (
     BAY_M,

@@ -14,9 +14,10 @@ import pandas as pd
 import torch
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import BoolArray
 from blast_env.cli.options import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, LearntSearch, improved

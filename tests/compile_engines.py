@@ -11,7 +11,6 @@ import numpy as np
 from blast_env import load_scenario, simulate
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.shared import consequences
 from blast_env.gas import (
     FaceLoads,
     GasCharge,
@@ -26,6 +25,7 @@ from blast_env.gas import (
 from blast_env.layout import draw_charge
 from blast_env.site import Scenario
 from blast_env.surrogate import Ways, relations
+from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
 

@@ -20,7 +20,7 @@ from blast_env.cli import app
 from blast_env.cluster import on_cluster
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
-from blast_env.evaluation.engines.contract import BlastLoads
+from blast_env.evaluation.record import BlastLoads
 from blast_env.runner import as_completed, run_all
 from tests.pieces_of_work import Touch, process, refuse_three, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD

@@ -4,46 +4,32 @@ All colour scales of a site come from the blast without a barrier under the same
 earlier pictures stay comparable when a layout is added.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from blast_env.app import placing
-from blast_env.app.records import (
-    COARSE,
-    RECORD,
-    BlastRecord,
-    CoarseLoads,
-    Picture,
-    StoredRecord,
-    blast_key,
-    read_kept,
-    read_record,
-    worst_first,
-    write_kept,
-)
-from blast_env.app.verdicts import keep_facades
+from blast_env.app.kept import StoredRecord, read_kept, write_kept
 from blast_env.app.work import StatusWriter
-from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.consequences import consequences_of
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation import BlastStore, LoadCase
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult, RecordedBlast
 from blast_env.files import make_folder, write_atomically
+from blast_env.gas.engine import Recorders
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
-from blast_env.layout.build_site import charge_against
 from blast_env.layout.placement import load_relevant
 from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import facades, full_load, gauge_history
 from blast_env.plots.ground_map import ground_map, ground_recorders, map_levels
-from blast_env.plots.pressure_film import record_planes, scale_end_kpa
+from blast_env.plots.pressure_film import PlaneRecorder, scale_end_kpa
 from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.style import render_extra
 from blast_env.provenance import versions
-from blast_env.runner import ProgressCallback, share_of
+from blast_env.runner import share_of
 from blast_env.site import Scenario, load_scenario
 from blast_env.units import PA_PER_KPA
 
@@ -86,6 +72,31 @@ def warm_engine() -> None:
     GasBlast(load_scenario("control_room"), engine=GasEngine(cells="coarse")).run()
 
 
+class Picture(StoredRecord):
+    """A picture of a blast: its file and its label."""
+
+    file: str
+    label: str
+
+
+class BlastPictures(StoredRecord):
+    """The pictures of a blast; written last, the file marks a complete blast.
+
+    Attributes:
+        pictures: The pictures.
+        seconds: Duration of the run and of the drawing, s.
+        repeat: The data to run it again: scenario hash, charge, versions.
+    """
+
+    pictures: tuple[Picture, ...] = ()
+    seconds: float
+    repeat: dict[str, Any]
+
+
+PICTURES: Final = "pictures.json"
+"""Name of the file of `BlastPictures` in the folder of a blast."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class BlastTask:
     """Blasts of one layout, one per threat.
@@ -93,10 +104,10 @@ class BlastTask:
     Attributes:
         site: The site.
         threats: The threats.
-        cache: Folder for the loads of blasts.
+        cache: Folder of the store of blasts.
         cells: The cells.
         layout: The layout.
-        blasts: Folder for the blasts, each under its key.
+        blasts: Folder for the pictures of blasts, each under its key.
     """
 
     site: Scenario
@@ -109,84 +120,69 @@ class BlastTask:
     def __call__(self, writer: StatusWriter) -> None:
         """Run one blast per threat with the layout, and one without a barrier for comparison.
 
-        Blasts with a complete record are not run again. The worst threat of the layout runs on
+        Blasts with a record and pictures are not run again. The worst threat of the layout runs on
         coarser cells at the end, for the error of the cells.
 
         Raises:
             BlastEnvError: If a blast cannot be run.
         """
-        layout = load_relevant(self.layout)
+        engine, store = GasEngine.with_cells(self.cells), BlastStore(self.cache)
+        layouts = {"": (), "layout": load_relevant(self.layout)}
+
+        def campaign(names: Iterable[str], threats: Sequence[LoadCase]) -> Campaign:
+            chosen = {name: layouts[name] for name in names}
+            return Campaign.on(self.site, chosen, threats, engine, engine.coarser, store)
+
         # The scale is that of the blast without a barrier, which comes first.
-        pairs = ((threat, each) for threat in self.threats for each in ((), layout))
-        work = list(dict.fromkeys(pairs))
-        for number, (threat, cells) in enumerate(work):
-            self._run(threat, cells, share_of(writer.share, number, len(work)))
-        self._run_coarse(layout)
+        pairs = [(threat, name) for threat in self.threats for name in layouts]
+        whole = campaign(layouts, self.threats)
+        for number, (threat, name) in enumerate(pairs):
+            keys = [whole.evaluator.key(layouts[each], threat).digest for each in ("", name)]
+            bare, folder = (self.blasts / each for each in keys)
+            is_known = whole.evaluator.known(layouts[name], threat) is not None
+            if not (is_known and read_kept(BlastPictures, folder / PICTURES)):
+                one = replace(campaign([name], [threat]), coarser=None)
+                one.run(share_of(writer.share, number, len(pairs)), _BlastDrawing(folder, bare))
+        whole.run()
         writer.write(state="done", share=1.0, text="done")
 
-    def _folder_of(self, layout: Layout, threat: LoadCase) -> Path:
-        charge = charge_against(self.site, layout, threat.charge)
-        return self.blasts / blast_key(self.site, layout, charge, self.cells)
 
-    def _run(self, threat: LoadCase, layout: Layout, tell: ProgressCallback) -> None:
-        site, folder = self.site, self._folder_of(layout, threat)
-        if read_record(folder) is not None:
-            return
+class _BlastDrawing:
+    """Draws a blast into its folder.
+
+    Args:
+        folder: The folder.
+        bare: That of the same threat without a barrier, which has the scale.
+    """
+
+    def __init__(self, folder: Path, bare: Path) -> None:
+        self._folder, self._bare = folder, bare
+        self._began_s = perf_counter()
+
+    def recorders(self, blast: GasBlast) -> Recorders:
+        """Return what makes the recorders of the film and of the ground."""
+        self._planes = PlaneRecorder(blast)
+        return lambda grid: (*self._planes.recorders(grid), *ground_recorders(grid))
+
+    def draw(self, found: RecordedBlast) -> None:
+        """Draw film, maps, walls and gauges."""
+        folder, result = self._folder, found.result
         make_folder(folder)
-        began_s, engine = perf_counter(), GasEngine.with_cells(self.cells)
-        blast = GasBlast(site, layout, 0, engine, threat.charge)
-        recording = share_of(tell, 0, 100, 60)
-        shot = record_planes(blast, progress=recording, recorders=ground_recorders)
-        result = shot.result
-        scale = _scale(shot, self._folder_of((), threat) / _SCALE)
-        if not layout:
+        shot = self._planes.shot(result)
+        scale = _scale(shot, self._bare / _SCALE)
+        if folder == self._bare:
             write_kept(scale, folder / _SCALE)
-        evaluator = BlastEvaluator(site, engine, cache=self.cache)
-        evaluator.keep(layout, threat, result.loads())  # for searches, reports and others
-        found = consequences_of(site, result, blast.site.charge)
-        keep_facades(found, folder)
-        film = _film(shot, scale, folder, share_of(tell, 60, 100, 25))
-        names = result.structures["structure"]
-        notes = [note for name in names for note in result.impulse(name).notes]
-        notes += [*result.stepped_notes, *result.gauge_notes]
-        unjudged = ((each.building, each.words) for each in found.unjudged)
-        charge = blast.site.charge
-        record = BlastRecord(
-            key=folder.name,
-            threat=threat.name,
-            cells=self.cells,
-            layout=placing.plain(layout),
-            loads=result.structure_loads,
-            notes=tuple(dict.fromkeys(notes)),
-            unchecked=(*found.unchecked, *unjudged),
+        film, charge = _film(shot, scale, folder), result.run.site.charge
+        drawn = BlastPictures(
             pictures=(film, *_pictures(result, scale, folder)),
-            seconds=perf_counter() - began_s,
+            seconds=perf_counter() - self._began_s,
             repeat={
-                "scenario hash": site.content_hash,
+                "scenario hash": result.blast.scenario.content_hash,
                 "charge": [list(charge.position_m), charge.tnt_kg, charge.height_m],
                 "versions": versions(),
             },
         )
-        write_kept(record, folder / RECORD)
-
-    def _run_coarse(self, layout: Layout) -> None:
-        """Keep the loads with coarser cells under the charge with the largest load."""
-        coarser = GasEngine.with_cells(self.cells).coarser
-        if coarser is None:
-            return
-
-        def load(threat: LoadCase) -> float:
-            record = read_record(self._folder_of(layout, threat))
-            assert record is not None
-            return worst_first(self.site.objective, record)
-
-        worst = max(self.threats, key=load)
-        evaluator = BlastEvaluator(self.site, coarser, cache=self.cache)
-        for cells in dict.fromkeys([layout, ()]):
-            path = self._folder_of(cells, worst) / COARSE
-            if not path.is_file():
-                found = evaluator.loads(cells, worst)
-                write_kept(CoarseLoads(loads=found.structures), path)
+        write_kept(drawn, folder / PICTURES)
 
 
 def _scale(shot: PressureShot, kept: Path) -> Scale:
@@ -240,12 +236,10 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
         yield Picture(file=name, label=f"gauge {gauge}")
 
 
-def _film(shot: PressureShot, scale: Scale, folder: Path, tell: ProgressCallback) -> Picture:
+def _film(shot: PressureShot, scale: Scale, folder: Path) -> Picture:
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
-    frames = []
-    for number, time_s in enumerate(np.linspace(0.0, scale.until_s, FRAMES).tolist(), start=1):
-        frames.append(Image.fromarray(painter.paint(time_s)))
-        tell(number / FRAMES)
+    times_s = np.linspace(0.0, scale.until_s, FRAMES).tolist()
+    frames = [Image.fromarray(painter.paint(time_s)) for time_s in times_s]
     with write_atomically(folder / _FILM) as temporary:
         frames[0].save(
             temporary,

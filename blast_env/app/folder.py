@@ -13,19 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from blast_env.app.blasts import PICTURES, BlastPictures, Picture
 from blast_env.app.design import Design, DesignStep, History
-from blast_env.app.records import (
-    COARSE,
-    MOST_BYTES,
-    RECORD,
-    BlastRecord,
-    CoarseLoads,
-    DesignSettings,
-    check_key,
-    read_kept,
-    read_record,
-    write_kept,
-)
+from blast_env.app.kept import MOST_BYTES, DesignSettings, check_key, read_kept, write_kept
 from blast_env.app.work import ANSWER
 from blast_env.documents import DocumentError, parse_json, read_text
 from blast_env.errors import BlastEnvError
@@ -67,7 +57,6 @@ class DesignFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._records: dict[str, BlastRecord] = {}
 
     @property
     def design_id(self) -> str:
@@ -130,24 +119,12 @@ class DesignFolder:
 
     def blasts_there(self) -> frozenset[str]:
         """Return the keys of the complete blasts."""
-        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{RECORD}"))
+        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{PICTURES}"))
 
-    def record_of(self, key: str) -> BlastRecord | None:
-        """Return the record of a blast, or `None` if it is not complete."""
-        if key not in self._records:
-            record = read_record(self.blast_of(key))
-            if record is None:
-                return None
-            self._records[key] = record  # it never changes again
-        return self._records[key]
-
-    def coarse_of(self, key: str) -> CoarseLoads | None:
-        """Return the loads of a blast on coarser cells, or `None` if they are not there."""
-        return read_kept(CoarseLoads, self.blast_of(key) / COARSE)
-
-    def coarse_there(self) -> frozenset[str]:
-        """Return the keys of the blasts with loads on coarser cells."""
-        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{COARSE}"))
+    def pictures_of(self, key: str) -> tuple[Picture, ...]:
+        """Return the pictures of a blast; none if it is not complete."""
+        found = read_kept(BlastPictures, self.blast_of(key) / PICTURES)
+        return () if found is None else found.pictures
 
     def answers_there(self) -> list[Path]:
         """Return the files of answers, the latest first."""

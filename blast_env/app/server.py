@@ -9,7 +9,7 @@ from typing import Final
 from blast_env.app.folder import WorkFolder
 from blast_env.app.guard import Entrance, Guard
 from blast_env.app.jobs import Workers
-from blast_env.app.records import check_key
+from blast_env.app.kept import check_key
 from blast_env.app.session import Sessions
 from blast_env.errors import BlastEnvError, import_extra
 

@@ -5,48 +5,39 @@ independent of each other.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from blast_env.answers.compare import BuildingVerdict, building_verdicts, comparison
+from blast_env.answers.document import Table, charge_text
 from blast_env.app import placing
 from blast_env.app.blasts import BlastTask
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
+from blast_env.app.kept import DesignSettings, read_kept
 from blast_env.app.offers import runs_blasts
-from blast_env.app.records import (
-    BlastedLayout,
-    DesignSettings,
-    blast_key,
-    comparison,
-    read_kept,
-)
 from blast_env.app.tasks import AnswerTask, ReportTask, SearchTask
 from blast_env.app.threats import threats_of, usual_threats
-from blast_env.app.verdicts import (
-    Judged,
-    damage_png,
-    stored_consequences,
-    verdict_table,
-)
 from blast_env.app.work import Answer, Question, Status, Task
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS
 from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import LoadCase
-from blast_env.evaluation.answers import AnswerTable
-from blast_env.evaluation.capacity import MOST_BLASTS
-from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation import BlastStore, LoadCase, LoadCaseSet
+from blast_env.evaluation.blasts import NO_BARRIER, Blasts
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.probability import Uncertainty
+from blast_env.evaluation.questions.capacity import MOST_BLASTS
+from blast_env.evaluation.questions.probability import Uncertainty
+from blast_env.evaluation.questions.verdict import BuildingResponse, Consequences, response_to
 from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
-from blast_env.layout.build_site import charge_against
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 
@@ -57,8 +48,7 @@ if TYPE_CHECKING:
 NO_FACADE = "Give structures windows or wall panels first (on the left)."
 """Message where no structure has a facade, so that there is no level of protection."""
 
-BARE = "no barrier"
-"""Name of the blast without a layout."""
+_DPI: Final = 100
 
 
 @dataclass(frozen=True)
@@ -98,7 +88,10 @@ class Session:
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
-    _judged: dict[tuple[str, str], tuple[Judged, ...]] = field(default_factory=dict, init=False)
+    _judged: dict[tuple[str, str], tuple[BuildingVerdict, ...]] = field(
+        default_factory=dict, init=False
+    )
+    _on: tuple[Scenario, Cells, Campaign] | None = field(default=None, init=False)
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
@@ -394,26 +387,26 @@ class Session:
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
         """Return the costs of the missing blasts of layouts."""
         keys: dict[str, AnyCharge] = {}
+        evaluator = self._campaign({}).evaluator
         for threat in self.chosen_threats():
             for layout in ((), *(self.design.layouts[each] for each in slots)):
-                keys[self.key(layout, threat)] = threat.charge
-        there = self.folder.blasts_there()
-        return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
+                key = evaluator.key(layout, threat).digest
+                if evaluator.known(layout, threat) is None or not self.folder.pictures_of(key):
+                    keys[key] = threat.charge
+        return tuple(self._cost(charge) for charge in keys.values())
 
     def cost_of_error(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
         """Return the costs of the missing blasts with coarser cells: the worst charge of each."""
-        coarser, there = self.engine.coarser, self.folder.coarse_there()
-        threats = self.chosen_threats()
+        coarser, threats = self._campaign({}).coarser, self.chosen_threats()
         if coarser is None:
             return ()
         layouts = dict.fromkeys([(), *(self.design.layouts[each] for each in slots)])
         missing = [
             layout
             for layout in layouts
-            if not any(self.key(layout, threat) in there for threat in threats)
+            if all(coarser.known(layout, threat) is None for threat in threats)
         ]
-        cost = coarser.cost(self.scenario, threats[0].charge)
-        return (cost,) * len(missing)
+        return (coarser.engine.cost(self.scenario, threats[0].charge),) * len(missing)  # type: ignore[return-value]
 
     @property
     def engine(self) -> GasEngine:
@@ -452,66 +445,102 @@ class Session:
 
         Empty layouts are left out: they equal no barrier.
         """
-        layouts: list[tuple[str, Layout]] = [(BARE, ())]
-        layouts += [
-            (name, layout)
-            for name, layout in zip(SLOTS, self.design.layouts, strict=True)
-            if layout
-        ]
         return tuple(
-            ShownLayout(name, layout, self.key(layout, threat)) for name, layout in layouts
+            ShownLayout(name, layout, self.key(layout, threat))
+            for name, layout in self._layouts.items()
         )
 
+    @property
+    def _layouts(self) -> dict[str, Layout]:
+        """The layouts to show, by name."""
+        named = zip(SLOTS, self.design.layouts, strict=True)
+        return {NO_BARRIER: (), **{name: layout for name, layout in named if layout}}
+
     def key(self, layout: Layout, threat: LoadCase) -> str:
-        """Return the key of a blast."""
-        charge = charge_against(self.scenario, layout, threat.charge)
-        return blast_key(self.scenario.without_budget, layout, charge, self.cells)
+        """Return the key of a blast, by which its pictures are kept."""
+        return self._campaign({}).evaluator.key(layout, threat).digest
 
-    def comparison(self) -> AnswerTable:
+    def _campaign(self, layouts: Mapping[str, Layout]) -> Campaign:
+        """Return a campaign under the chosen threats, whose blasts are stored or not."""
+        if self._on is None or self._on[:2] != (self.scenario, self.cells):
+            one = Campaign.on(
+                self.scenario.without_budget,
+                {},
+                self.chosen_threats(),
+                self.engine,
+                self.engine.coarser,
+                self._store,
+            )
+            self._on = self.scenario, self.cells, one
+        case = LoadCaseSet(self._on[2].scenario, self.chosen_threats())
+        return replace(self._on[2], case=case, layouts=layouts)
+
+    @cached_property
+    def _store(self) -> BlastStore:
+        return BlastStore(self.work.cache)
+
+    def results(self) -> dict[str, Blasts]:
+        """Return the stored blasts of the shown layouts beside those of no barrier, by name."""
+        found = {
+            name: self._campaign({NO_BARRIER: (), name: layout}).stored()
+            for name, layout in self._layouts.items()
+        }
+        return {name: blasts for name, blasts in found.items() if blasts is not None}
+
+    def comparison(self) -> Table:
         """Return the table of all blasts of the current design."""
-        threats, folder = self.chosen_threats(), self.folder
-        layouts = []
-        for number, each in enumerate(self.shown(threats[0])):
-            keys = {threat.name: self.shown(threat)[number].key for threat in threats}
-            found = {name: folder.record_of(key) for name, key in keys.items()}
-            records = {name: own for name, own in found.items() if own is not None}
-            coarse = {own.key: folder.coarse_of(own.key) for own in records.values()}
-            known = {key: loads for key, loads in coarse.items() if loads is not None}
-            cost = placing.cost_of(self.scenario, each.layout)
-            layouts.append(BlastedLayout(each.name, cost, records, known))
-        return comparison(layouts, [each.name for each in threats], self.scenario)
+        layouts = {
+            name: (blasts, placing.cost_of(self.scenario, self._layouts[name]))
+            for name, blasts in self.results().items()
+        }
+        return comparison(layouts, [each.name for each in self.chosen_threats()], self.scenario)
 
-    def verdicts(self) -> AnswerTable:
-        """Return the verdicts on the buildings in all blasts of the current design."""
-        found = [
-            (each.name, record, self.judged(each, threat))
+    def verdicts(self) -> list[tuple[str, str, tuple[BuildingVerdict, ...]]]:
+        """Return the verdicts on the buildings in all blasts of the current design.
+
+        Each has the name of the layout, that of the threat, and the verdicts.
+        """
+        return [
+            (each.name, threat.name, own)
             for threat in self.chosen_threats()
             for each in self.shown(threat)
-            if (record := self.folder.record_of(each.key)) is not None
+            if (own := self.judged(each, threat))
         ]
-        return verdict_table(self.scenario, found)
 
-    def judged(self, shown: ShownLayout, threat: LoadCase) -> tuple[Judged, ...]:
+    def judged(self, shown: ShownLayout, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
         """Return the response of the buildings with their current facades to a blast."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
         known = shown.key, repr(self.scenario.bays_with(shown.layout))
         if known not in self._judged:
-            read = self._facades(shown, threat)
-            if read is None:
+            found = self._consequences(shown, threat)
+            if found is None:
                 return ()
-            self._judged[known] = tuple(map(Judged.of, read.responses))
+            self._judged[known] = building_verdicts(found)
         return self._judged[known]
 
     def damage_png(self, shown: ShownLayout, threat: LoadCase, building: str) -> bytes | None:
         """Return the picture of a building's damage; `None` without the histories on its bays."""
-        read = self._facades(shown, threat)
-        own = () if read is None else (x for x in read.responses if x.building == building)
+        found = self._consequences(shown, threat)
+        own = () if found is None else (x for x in found.responses if x.building == building)
         return next(map(damage_png, own), None)
 
-    def _facades(self, shown: ShownLayout, threat: LoadCase) -> Consequences | None:
-        folder = self.folder.blast_of(shown.key)
-        return stored_consequences(self.scenario, shown.layout, threat.charge, folder)
+    def _consequences(self, shown: ShownLayout, threat: LoadCase) -> Consequences | None:
+        record = self._campaign({}).evaluator.known(shown.layout, threat)
+        if record is None:
+            return None
+        charge = threat.charge_against(self.scenario, shown.layout)
+        return response_to(self.scenario, shown.layout, charge, record)
+
+
+def damage_png(building: BuildingResponse) -> bytes:
+    """Return the facade of one building in the colours of its damage, as PNG."""
+    # Here, because pictures take half a second to import, and tables need none.
+    from blast_env.plots.facade import facade_picture
+    from blast_env.plots.figures import png_of
+
+    rows = [(charge_text(building.charge), building)]
+    return png_of(facade_picture(rows, building.building), _DPI)
 
 
 @dataclass

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from blast_env.answers.document import AnyPart, Document
 from blast_env.app import placing
-from blast_env.app.records import write_kept
+from blast_env.app.kept import write_kept
 from blast_env.app.work import ANSWER, Answer, Question, StatusWriter
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
 from blast_env.design.search.registry import proposer_row
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
-from blast_env.evaluation.answers import AnswerPart
+from blast_env.evaluation.blasts import NO_BARRIER
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
@@ -143,27 +145,34 @@ class AnswerTask:
             changes["layout"] = placing.plain(layout) or None
         else:
             parts = [*self._judgement(writer)]
-        answer = Answer(question=self.question, subject=self.subject, parts=tuple(parts))
+        document = Document.of(parts)
+        answer = Answer(question=self.question, subject=self.subject, document=document)
         write_kept(answer, writer.folder / ANSWER)
-        first = next(each for each in answer.parts if isinstance(each, str))
-        writer.write(state="done", share=1.0, text=first, **changes)
+        writer.write(state="done", share=1.0, text=document.first, **changes)
 
-    def _judgement(self, writer: StatusWriter) -> Iterator[AnswerPart]:
+    def _judgement(self, writer: StatusWriter) -> Iterator[AnyPart]:
         # Here, as below, because they take long to import, and a blast needs none of them.
-        from blast_env.evaluation.assessment import assess
-        from blast_env.evaluation.capacity import capacity
+        from blast_env.answers.assess import assessment, capacity_answer, governing
+        from blast_env.evaluation.questions.capacity import capacity
 
-        engine, charges = GasEngine.with_cells(self.cells), [each.charge for each in self.threats]
-        layouts: dict[str, Layout] = {"no barrier": ()}
+        engine = GasEngine.with_cells(self.cells)
+        layouts: dict[str, Layout] = {NO_BARRIER: ()}
         if self.layout:
             layouts[f"layout {self.name}"] = self.layout
         if self.question is Question.ASSESS:
-            found = assess(self.site, layouts, charges, engine, writer.share, cache=self.cache)
-            return found.answer(self.target, self.mass_error)
-        evaluator = BlastEvaluator(self.site, engine, cache=self.cache)
-        return iter(capacity(evaluator, layouts, charges, writer.share))
+            campaign = Campaign.on(
+                self.site, layouts, self.threats, engine, engine.coarser, self.cache
+            )
+            blasts = campaign.run(writer.share, worst=governing)
+            return assessment(blasts, self.target, self.mass_error)
+        evaluator, charges = (
+            BlastEvaluator(self.site, engine, cache=self.cache),
+            [each.charge for each in self.threats],
+        )
+        return capacity_answer(self.site, capacity(evaluator, layouts, charges, writer.share))
 
-    def _advice(self, writer: StatusWriter) -> tuple[Layout, list[AnswerPart]]:
+    def _advice(self, writer: StatusWriter) -> tuple[Layout, list[AnyPart]]:
+        from blast_env.answers.advise import advice_answer
         from blast_env.design.search.advised import AdviceJudge, advised, site_with_target
 
         engine, site = GasEngine.with_cells(self.cells), site_with_target(self.site, self.target)
@@ -174,7 +183,7 @@ class AnswerTask:
             self.mass_error,
         )
         advice = advised(judge, self.budget, progress=writer.share)
-        return advice.best.layout, [*advice.answer()]
+        return advice.best.layout, [*advice_answer(advice)]
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from pathlib import Path
 from time import monotonic, time
 from typing import Any, Final, Literal, TypeAlias
 
-from blast_env.app.records import MOST_BYTES, StoredRecord, write_kept
+from blast_env.answers.document import Document
+from blast_env.app.kept import MOST_BYTES, StoredRecord, write_kept
 from blast_env.documents import check_values, read_text
-from blast_env.evaluation.answers import AnswerTable
 
 STATUS: Final = "status.json"
 ANSWER: Final = "answer.json"
@@ -134,9 +134,9 @@ class Answer(StoredRecord):
     Attributes:
         question: The question.
         subject: Digest of the site, the layout and the threats.
-        parts: Its lines and tables.
+        document: The answer.
     """
 
     question: Question
     subject: str
-    parts: tuple[str | AnswerTable, ...]
+    document: Document

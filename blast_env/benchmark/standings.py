@@ -5,9 +5,9 @@ from math import isnan
 
 import numpy as np
 
+from blast_env.answers.document import Table
 from blast_env.benchmark.definitions import DEFINITIONS
 from blast_env.benchmark.judging import JudgedSubmission
-from blast_env.evaluation.answers import AnswerTable
 from blast_env.statistics import Estimate, holm_adjusted
 from blast_env.tables import markdown_table
 from blast_env.values import markup_text
@@ -25,7 +25,7 @@ _NAMED = 3
 """Most problems that a title names."""
 
 
-def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[AnswerTable]:
+def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[Table]:
     """Yield a table for each set of problems and size of the judge's cells."""
     groups: dict[tuple[tuple[str, ...], float], list[JudgedSubmission]] = {}
     for each in judged:
@@ -38,7 +38,7 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
     """Return the page of the documentation with the standings, in Markdown."""
     parts = [_HEAD]
     for table in standings_tables(judged):
-        rows = [[markup_text(cell) for cell in row] for row in table.rows]
+        rows = [[markup_text(cell) for cell in row] for row in table.cells()]
         title = markup_text(table.title)
         parts += [f"## {title}\n", markdown_table(table.headers, rows) + "\n"]
     methods: dict[str, list[str]] = {}
@@ -54,9 +54,7 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
     return "\n".join(parts)
 
 
-def _table(
-    judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float
-) -> AnswerTable:
+def _table(judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float) -> Table:
     """Return the table of submissions to the same problems, the largest lead first."""
     runs = {run.problem: run for entry in judged for run in entry.runs}.values()
     rule, best = (
@@ -88,7 +86,7 @@ def _table(
         names = "All problems"
     elif len(problems) > _NAMED:
         names = f"{len(problems)} problems: {', '.join(problems[:_NAMED])}, ..."
-    return AnswerTable(
+    return Table(
         f"{names}; cells of {cell_m:g} m",
         (
             *("method", "blasts", "seeds", "load taken off, %", "beside the best rule, points"),

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from blast_env.answers.advise import advice_answer
+from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     FINAL_CELLS,
@@ -24,15 +26,7 @@ from blast_env.cli.options import (
     resume_words,
     wanted_level,
 )
-from blast_env.cli.output import (
-    print_answer,
-    print_cost,
-    print_line,
-    print_written,
-    progress_bar,
-    resumable,
-    save_figures,
-)
+from blast_env.cli.output import print_cost, print_written, progress_bar, resumable, save_figures
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import (
@@ -106,17 +100,19 @@ def advise(
     evaluator = BlastEvaluator(site, engine, cache=cache)
     problem = DesignProblem(evaluator, LoadCaseSet(site, threats), processes)
     kinds = kinds_for(site)
-    asked = [(engine, each.charge) for each in islice(cycle(threats), len(kinds) * rounds * budget)]
-    asked += [(judge, each.charge) for each in threats] * (len(kinds) * rounds)
     print_line(
         f"{len(kinds)} kinds, at most {rounds} searches of {budget} blasts each, {engine.words}; "
         f"each result is judged with {len(threats)}, {judge.words}"
     )
-    print_cost((each, site, charge) for each, charge in asked)
+    coarse, fine = (
+        [each.cost(site, threat.charge) for threat in threats] for each in (engine, judge)
+    )
+    costs = [*islice(cycle(coarse), len(kinds) * rounds * budget), *fine * (len(kinds) * rounds)]
+    print_cost(each for each in costs if each is not None)
     judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
     with resumable(resume_words(cache)), progress_bar(f"{len(kinds)} kinds") as progress:
         found = advised(judging, budget, rounds, seed, progress)
-    print_answer(found.answer())
+    print_parts(advice_answer(found))
     if out is not None:
         made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
         print_written([write_layout(out, site, found.best.layout, made)])

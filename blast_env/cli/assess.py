@@ -1,11 +1,15 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import typer
 
+from blast_env.answers.assess import Assessed, assessment, capacity_answer, governing
+from blast_env.answers.document import charge_text
+from blast_env.answers.terminal import print_line, print_parts, print_table
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     CacheOption,
@@ -26,38 +30,27 @@ from blast_env.cli.options import (
     resume_words,
     wanted_level,
 )
-from blast_env.cli.output import (
-    judged_blasts,
-    print_answer,
-    print_cost,
-    print_line,
-    print_table,
-    print_written,
-    progress_bar,
-    resumable,
-    save_figures,
-)
+from blast_env.cli.output import print_cost, print_written, progress_bar, resumable, save_figures
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.answers import charge_text
-from blast_env.evaluation.assessment import Assessed
-from blast_env.evaluation.assessment import assess as assessed_by
-from blast_env.evaluation.capacity import MOST_BLASTS
-from blast_env.evaluation.capacity import capacity as capacity_of
-from blast_env.evaluation.consequences import (
-    BuildingResponse,
-    Consequences,
-    bay_table,
-)
+from blast_env.evaluation import BlastEvaluator, LoadCase
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines import JUDGE, Engine, final_engine
-from blast_env.evaluation.screening import (
+from blast_env.evaluation.questions.capacity import MOST_BLASTS
+from blast_env.evaluation.questions.capacity import capacity as capacity_of
+from blast_env.evaluation.questions.screening import (
     LEFT_OUT,
     STAND_OFF_HEADERS,
     THREAT_HEADERS,
     Screening,
 )
-from blast_env.evaluation.screening import screen as screen_site
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions.screening import screen as screen_site
+from blast_env.evaluation.questions.verdict import (
+    BuildingResponse,
+    Consequences,
+    bay_table,
+    check_facades,
+    consequences_of,
+)
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.response.buildings import LevelOfProtection
@@ -172,20 +165,18 @@ def assess(
         with resumable(resume_words(cache)):
             _capacity(evaluator, layouts, drawn)
         return
+    check_facades(site, engine)
+    campaign = replace(
+        Campaign.on(site, layouts, threats, engine, engine.coarser, cache),
+        without_fallen=without_fallen,
+    )
     print_line(engine.describe([site]))
-    print_cost(judged_blasts(engine, site, drawn, len(layouts)))
+    print_cost(campaign.cost())
     with resumable(resume_words(cache)):
         with progress_bar(count_of("charge", len(drawn))) as progress:
-            assessed = assessed_by(
-                site,
-                layouts,
-                drawn,
-                engine,
-                progress,
-                without_fallen=without_fallen,
-                cache=cache,
-            )
-        print_answer(assessed.answer(level, mass_error, required))
+            blasts = campaign.run(progress, worst=governing)
+        assessed = Assessed(blasts)
+        print_parts(assessment(blasts, level, mass_error, required))
     if table is not None:
         print_written([write_csv(bay_table(assessed.found), table)])
     _draw(assessed, picture, diagram)
@@ -197,10 +188,11 @@ def _capacity(
     """Print the largest charges and the least stand-offs that keep each level."""
     site, engine = evaluator.scenario, evaluator.engine
     print_line(engine.describe([site]))
-    print_cost([(engine, site, each) for each in charges for _ in layouts] * MOST_BLASTS)
+    costs = Campaign.on(site, layouts, list(map(LoadCase, charges)), engine).cost()
+    print_cost(costs * MOST_BLASTS)
     with progress_bar(f"{site.name}: masses and stand-offs") as progress:
         found = capacity_of(evaluator, layouts, charges, progress)
-    print_answer(found)
+    print_parts(capacity_answer(site, found))
 
 
 def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> None:
@@ -209,9 +201,8 @@ def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> Non
 
     def title() -> str:
         building = rows[0][1].building
-        return (
-            f"{assessed.scenario.title_of(building)}: {charge_text(rows[0][1].charge)}, the worst"
-        )
+        words = assessed.blasts.scenario.title_of(building)
+        return f"{words}: {charge_text(rows[0][1].charge)}, the worst"
 
     def facades() -> "Figure":
         from blast_env.plots.facade import facade_picture
@@ -276,14 +267,13 @@ def _by_gas(
     scenario: Scenario, layout: Layout, found: Screening, engine: Engine
 ) -> dict[str, Consequences]:
     """Return the consequences of each worst place by gas dynamics."""
+    threats = [LoadCase(each.charge, name=each.name) for each in found.threats]
+    campaign = Campaign.on(scenario, {"": layout}, threats, engine)
     print_line(engine.describe([scenario]))
-    print_cost((engine, scenario, each.charge) for each in found.threats)
-    result, evaluator = {}, BlastEvaluator(scenario, engine)
-    with progress_bar(f"{len(found.threats)} blasts") as progress:
-        for number, each in enumerate(found.threats, start=1):
-            result[each.name] = consequences(evaluator, layout, [each.charge])
-            progress(number / len(found.threats))
-    return result
+    print_cost(campaign.cost())
+    with progress_bar(f"{len(threats)} blasts") as progress:
+        blasts = campaign.run(progress)
+    return {each.name: consequences_of(blasts.under([k])) for k, each in enumerate(threats)}
 
 
 def _print_threats(
@@ -300,4 +290,4 @@ def _print_threats(
             words = response_words([each.facade for each in by_gas.responses])
             flagged = "flagged" if by_gas.is_flagged else ""
             rows.append(("  by gas", *[""] * 4, *words, flagged))
-    print_table(title, THREAT_HEADERS, rows, text_columns=2)
+    print_table(title, THREAT_HEADERS, rows, 2)

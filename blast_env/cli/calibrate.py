@@ -6,15 +6,10 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.cli.command import writes
 from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, numbers, running_on
-from blast_env.cli.output import (
-    print_line,
-    print_written,
-    progress_bar,
-    resumable,
-    save_pictures,
-)
+from blast_env.cli.output import print_written, progress_bar, resumable, save_pictures
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, PAPER_ENGINES, find_engine
 from blast_env.files import make_folder

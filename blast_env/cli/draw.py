@@ -4,9 +4,9 @@ from pathlib import Path
 
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import LayoutOption
-from blast_env.cli.output import print_line
 from blast_env.cli.suitability import suitability
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutState, load_layout

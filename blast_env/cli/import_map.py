@@ -8,17 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import typer
 
+from blast_env.answers.document import titled
+from blast_env.answers.terminal import print_line, print_table
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.interruptions import Interruptions
 from blast_env.cli.options import GlazingOption, WallOption, numbers
-from blast_env.cli.output import (
-    print_json,
-    print_line,
-    print_table,
-    print_written,
-    save_pictures,
-)
-from blast_env.evaluation.answers import titled
+from blast_env.cli.output import print_json, print_written, save_pictures
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 

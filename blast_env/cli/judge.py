@@ -10,6 +10,7 @@ from typing import Final
 
 import typer
 
+from blast_env.answers.terminal import print_line, print_parts
 from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
@@ -34,7 +35,7 @@ from blast_env.benchmark import judge as judge_submission
 from blast_env.benchmark.judging import read_submission
 from blast_env.cli.command import writes
 from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
-from blast_env.cli.output import print_answer, print_line, print_written, progress_bar, resumable
+from blast_env.cli.output import print_written, progress_bar, resumable
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastStore
@@ -123,7 +124,7 @@ def judge(
                 references = references_of(definitions, played, cell_m, judging.shared, guided)
             judged += [judging.judged(each, definitions, references) for each in played]
     together = (*shipped_standings(), *judged)
-    print_answer(standings_tables(together))
+    print_parts(standings_tables(together))
     if not together:
         print_line("no submissions come with the package")
     if page is not None:

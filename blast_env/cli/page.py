@@ -4,7 +4,8 @@ from pathlib import Path
 
 import typer
 
-from blast_env.cli.output import message_console, print_line
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import message_console
 
 
 def page(

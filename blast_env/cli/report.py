@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     CHARGE,
@@ -22,7 +23,6 @@ from blast_env.cli.options import (
 from blast_env.cli.output import (
     InterruptedCommandError,
     message_console,
-    print_line,
     print_written,
     progress_bar,
     resumable,

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, islice
-from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -12,6 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 import typer
 
+from blast_env.answers.assess import cells_words
+from blast_env.answers.document import AnyCell, Number, interval, percent
+from blast_env.answers.terminal import print_line, print_table
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     SCENARIO_HELP,
@@ -32,11 +34,8 @@ from blast_env.cli.output import (
     LAYOUT_NAME,
     LAYOUT_PICTURE,
     InterruptedCommandError,
-    judged_blasts,
     layout_picture,
     print_cost,
-    print_line,
-    print_table,
     print_written,
     progress_bar,
     resumable,
@@ -69,7 +68,7 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
-from blast_env.evaluation.answers import load_text, percent, share_text
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.files import make_folder
@@ -80,7 +79,7 @@ from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.objective import ConditionalValueAtRisk, WorstRisk
 from blast_env.site.zone import source_bounds_m
-from blast_env.statistics import CVAR_LEVEL, Estimate, reductions
+from blast_env.statistics import CVAR_LEVEL, reductions
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
@@ -251,7 +250,8 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
     scenario, evaluator = problem.scenario, problem.evaluator
     print_line(evaluator.engine.describe([scenario]))
     turns = islice(cycle(problem.threats), budget)
-    print_cost((evaluator.engine, scenario, each.charge) for each in turns)
+    costs = (evaluator.engine.cost(scenario, each.charge) for each in turns)
+    print_cost(each for each in costs if each is not None)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.counts.cache_hits, perf_counter()
     with progress_bar(f"{method.name} search in {scenario.name}") as progress:
@@ -296,21 +296,20 @@ def print_search(run: SearchRun, checked: Evaluation | None) -> None:
         problem.case.objective_value(problem.unprotected),
         problem.load(result.layout),
     )
-    text = problem.scenario.objective.text
-    rows = [
+    number = partial(Number.load, problem.scenario.objective)
+    rows: list[tuple[AnyCell, ...]] = [
         (
-            *("of the search", str(len(problem.threats)), text(unprotected), text(load)),
-            *(percent(reductions(load, unprotected).item()), "-"),
+            *("of the search", str(len(problem.threats)), number(unprotected), number(load)),
+            *(Number.share(reductions(load, unprotected).item()), "-"),
         )
     ]
     if checked is not None:
-        low, high = checked.ci95
         rows.append(
             (
                 *("held out", str(len(checked.threats))),
-                *(text(checked.unprotected_load), text(checked.load)),
-                percent(checked.mean_reduction),
-                "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
+                *(number(checked.unprotected_load), number(checked.load)),
+                Number.share(checked.mean_reduction),
+                interval(checked.reduction),
             )
         )
     title = f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}"
@@ -469,8 +468,8 @@ def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
     layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
     distinct = list(dict.fromkeys(layouts.values()))
     print_line(engine.describe())
-    drawn = [each.charge for each in case.threats]
-    print_cost(judged_blasts(engine, scenario, drawn, len(distinct)))
+    named = {str(number): each for number, each in enumerate(distinct)}
+    print_cost(Campaign.on(scenario, named, case.threats, engine, engine.coarser).cost())
     evaluators, found = Evaluators(engine), dict[Layout, Evaluation]()
     with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
         for number, each in enumerate(distinct):
@@ -480,16 +479,17 @@ def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
             )
     loads = {name: found[each].load for name, each in layouts.items()}
     best_last = sorted(rules, key=lambda name: -loads[name])
-    rows = []
+    rows: list[tuple[AnyCell, ...]] = []
     for name in (_NOTHING, *best_last, _PROPOSAL):
-        own, load = found[layouts[name]], Estimate(loads[name], nan, nan)
-        gone = share_text(own.reduction, own.reduction_error) if name != _NOTHING else "-"
-        rows.append((name, load_text(scenario.objective, load, own.objective_error), gone))
+        own = found[layouts[name]]
+        share = Number.share(own.mean_reduction, own.reduction_error)
+        gone = "-" if name == _NOTHING else share.sampled_by(own.reduction, "charges", 0.01)
+        rows.append((name, Number.load(scenario.objective, loads[name], own.objective_error), gone))
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     title = f"{scenario.name}: judged by gas dynamics on {charges}"
     print_table(title, ("layout", "load", "reduction"), rows)
     error = found[layout].grid_error
     if error is not None:
-        print_line(error.words)
+        print_line(cells_words(error))
     if best_last and loads[best_last[-1]] < loads[_PROPOSAL]:
         print_line(f"note: {best_last[-1]} does better here than the proposal")

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
+from blast_env.answers.document import building_words, standing_lines
+from blast_env.answers.pieces import pieces_answer
+from blast_env.answers.terminal import print_line, print_parts, print_table
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     UNTIL_HELP,
@@ -22,19 +25,10 @@ from blast_env.cli.options import (
     TntOption,
     refuse_given,
 )
-from blast_env.cli.output import (
-    print_answer,
-    print_json,
-    print_line,
-    print_table,
-    print_written,
-    progress_bar,
-)
+from blast_env.cli.output import print_json, print_written, progress_bar
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import building_words, standing_lines
 from blast_env.evaluation.engines import JUDGE, BlastResult, Engine, find_engine
-from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
-from blast_env.evaluation.engines.pieces import pieces_answer
+from blast_env.evaluation.record import StructureLoad, on_buildings
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.layout.build_site import draw_threat
@@ -235,7 +229,7 @@ def _print_gas(result: "GasResult") -> None:
     ]
     if gauges:
         print_table("gauges", _GAUGES, gauges)
-    print_answer(pieces_answer(result.pieces, "stability of the barrier"))
+    print_parts(pieces_answer(result.pieces, "stability of the barrier"))
     texts = [*standing_lines(scenario, result.buildings, "building")]
     # One line a cause: a standing has named its own.
     said = tuple(result.buildings["reason"])
@@ -264,7 +258,7 @@ def _print_loads(
         f"{blast.scenario.name}: {charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, {more}, "
         f"{layout_counts(blast.layout, 'barrier')}"
     )
-    print_table(title, headers, rows, text_columns=2)
+    print_table(title, headers, rows, 2)
 
 
 def _print_end(

@@ -1,8 +1,6 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.comparison import Evaluation, ThreatOutcome
-from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.evaluate import compare, evaluate_layout
 from blast_env.evaluation.evaluator import (
     Assessment,
@@ -11,8 +9,10 @@ from blast_env.evaluation.evaluator import (
     DesignProblem,
     Evaluators,
 )
-from blast_env.evaluation.grid_error import GridError, convergence_index
-from blast_env.evaluation.store import BlastKey, BlastStore
+from blast_env.evaluation.questions.grid_error import GridError, convergence_index
+from blast_env.evaluation.questions.reduction import Evaluation, ThreatOutcome
+from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
+from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,

@@ -1,25 +1,27 @@
 """Functions that evaluate layouts: `evaluate_layout`, and comparisons on many cases."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from itertools import groupby, islice
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct, draw_threats, in_turn
-from blast_env.evaluation.comparison import Evaluation
+from blast_env.evaluation.blasts import NO_BARRIER
+from blast_env.evaluation.campaign import Campaign, blasts_of
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, draw_threats, in_turn
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.engines.contract import BlastLoads, final_engine
+from blast_env.evaluation.engines.contract import final_engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.grid_error import grid_error
+from blast_env.evaluation.questions.reduction import Evaluation
 from blast_env.evaluation.store import BlastStore
-from blast_env.geometry import Element, Layout
+from blast_env.geometry import Element
 from blast_env.layout import check_layout
-from blast_env.runner import share_of
-from blast_env.site import AnyScenario, Scenario, find_scenario
+from blast_env.site import AnyScenario, find_scenario
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level
+
+_LAYOUT: Final = "layout"
 
 
 def evaluate_layout(
@@ -112,52 +114,20 @@ def compare(
     check_cvar_level(cvar_level)
     if not cases:
         raise BlastEnvError("cases: there are none, must be at least one")
-    pairs = zip(cases, layouts, strict=True)
-    cells = [tuple(check_layout(case.scenario, layout)) for case, layout in pairs]
-    blasts, unprotected = zip(
-        *_loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
-    )
-    found = Evaluation(
-        tuple(cases), tuple(cells), blasts, unprotected, evaluators.engine, cvar_level
-    )
+    campaigns = [
+        Campaign(
+            case,
+            {NO_BARRIER: (), _LAYOUT: tuple(check_layout(case.scenario, layout))},
+            evaluators.of(case.scenario),
+            processes=processes,
+        )
+        for case, layout in zip(cases, layouts, strict=True)
+    ]
+    found = blasts_of(campaigns, progress)
     coarser = evaluators.coarser() if with_error else None
-    if coarser is None:
-        return found
-    number, worst = (
-        int(each) for each in np.unravel_index(found.loads.argmax(), found.loads.shape)
-    )
-    case, fine = cases[number], (blasts[number][worst], unprotected[number][worst])
-    there = coarser.of(case.scenario)
-    error = grid_error(there, case, cells[number], case.threats[worst], fine, processes)
-    return replace(found, grid_error=error)
-
-
-def _loads_of_both(
-    evaluator_of: Callable[[Scenario], BlastEvaluator],
-    cases: Sequence[LoadCaseSet],
-    layouts: Sequence[Layout],
-    processes: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
-    """Yield the loads with the layout of each case and those without a barrier, one per threat.
-
-    Consecutive cases on one scenario run together.
-    """
-    done = 0
-    for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
-        together = list(group)
-        for case, _ in together:
-            check_distinct(case.threats)
-        pairs = [
-            (cells, threat)
-            for case, layout in together
-            for threat in case.threats
-            for cells in (layout, ())
-        ]
-        known_charge = share_of(progress, done, len(cases), len(together))
-        evaluator = evaluator_of(together[0][0].scenario)
-        loads = iter(evaluator.loads_of_many(pairs, processes, known_charge))
-        for case, _ in together:
-            own = list(islice(loads, 2 * len(case.threats)))
-            yield tuple(own[0::2]), tuple(own[1::2])
-        done += len(together)
+    if coarser is not None:
+        loads = [each.loads(each.judged).max() for each in found]
+        number = int(np.argmax(loads))
+        campaign = replace(campaigns[number], coarser=coarser.of(cases[number].scenario))
+        found[number] = campaign.with_coarse(found[number], found[number].worst())
+    return Evaluation(tuple(found), cvar_level)

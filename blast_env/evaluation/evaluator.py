@@ -3,10 +3,12 @@
 An evaluator runs and caches the blasts of a scenario; a problem is a case to find a layout for.
 """
 
+import dataclasses
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Final, Self
 
@@ -19,16 +21,17 @@ from blast_env.evaluation.cases import (
     check_distinct,
     check_something_arrives,
 )
-from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
-from blast_env.evaluation.engines.contract import EngineBlast
-from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
+from blast_env.evaluation.engines import Engine, find_engine
+from blast_env.evaluation.engines.contract import BlastDrawing, EngineBlast
+from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts_digest
+from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState, check_layout
 from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import as_completed, check_workers
+from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.statistics import reductions
@@ -103,6 +106,7 @@ class BlastEvaluator:
             engine=engine_text(self.engine),
             calibration="" if self.calibration is None else calibration_digest(self.calibration),
             code=code_version(),
+            parts=parts_digest(self.scenario),
         )
 
     @property
@@ -145,13 +149,7 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
-        check_workers("processes", processes)
-        asked: dict[BlastKey, AnyCharge] = {}
-        keys, layouts = [], []
-        for layout, threat in pairs:
-            layouts.append(tuple(check_layout(self.scenario, layout)))
-            keys.append(self.key(layout, threat))
-            asked.setdefault(keys[-1], threat.charge)
+        asked, keys, layouts = self._asked(pairs, processes)
         stored = ((key, self.store.get(key, self.scenario)) for key in asked)
         found = {key: loads for key, loads in stored if loads is not None}
         missing = {key: (self, charge) for key, charge in asked.items() if key not in found}
@@ -160,13 +158,82 @@ class BlastEvaluator:
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
         self.counts.cache_hits += len(keys) - len(missing)
-        objective, loads_of = self.scenario.objective, [found[key] for key in keys]
-        if objective.kind != "response":
-            return loads_of
         return [
-            loads.with_facades(self.scenario.named_bays(layout), objective)
-            for loads, layout in zip(loads_of, layouts, strict=True)
+            self._responding(found[key], layout) for key, layout in zip(keys, layouts, strict=True)
         ]
+
+    def records_of_many(
+        self,
+        pairs: Iterable[tuple[Sequence[Element], LoadCase]],
+        processes: int = 1,
+        progress: ProgressCallback | None = None,
+        drawing: BlastDrawing | None = None,
+    ) -> list[BlastRecord]:
+        """Return the records of many blasts, complete of an engine whose records are.
+
+        Others are as for `loads_of_many`, also the errors. With `drawing`, which draws each blast,
+        all of them are run in this process, whether or not they are known.
+        """
+        if not self.engine.is_complete:
+            return list(map(BlastRecord, self.loads_of_many(pairs, processes, progress)))
+        asked, keys, layouts = self._asked(pairs, processes)
+        stored = (
+            {}
+            if drawing is not None
+            else {key: self.store.record(key, self.scenario) for key in asked}
+        )
+        found = {key: record for key, record in stored.items() if record is not None}
+        missing = {
+            key: EngineBlast(self.scenario, key.layout, charge, key.seed)
+            for key, charge in asked.items()
+            if key not in found
+        }
+        if processes > 1 and drawing is None:
+            ran = as_completed(self.engine.record, list(missing.values()), processes)
+        else:
+            parts = [share_of(progress, k, len(missing)) for k in range(len(missing))]
+            ran = (
+                (number, self.engine.record(blast, parts[number], drawing))
+                for number, blast in enumerate(missing.values())
+            )
+        names = list(missing)
+        for done, (number, record) in enumerate(ran, start=1):
+            found[names[number]] = record
+            self._keep(names[number], record)
+            if progress is not None:
+                progress(1.0 - (len(missing) - done) / len(missing))
+        self.counts.cache_hits += len(keys) - len(missing)
+        return [
+            replace(found[key], loads=self._responding(found[key].loads, layout))
+            for key, layout in zip(keys, layouts, strict=True)
+        ]
+
+    def _asked(
+        self, pairs: Iterable[tuple[Sequence[Element], LoadCase]], processes: int
+    ) -> tuple[dict[BlastKey, AnyCharge], list[BlastKey], list[Layout]]:
+        """Return the charge of each blast by its key, and the key and the layout of each pair."""
+        check_workers("processes", processes)
+        asked: dict[BlastKey, AnyCharge] = {}
+        keys, layouts = [], []
+        for layout, threat in pairs:
+            layouts.append(tuple(check_layout(self.scenario, layout)))
+            keys.append(self.key(layout, threat))
+            asked.setdefault(keys[-1], threat.charge)
+        return asked, keys, layouts
+
+    def _responding(self, loads: BlastLoads, layout: Layout) -> BlastLoads:
+        """Return loads with the response of the facades, where the objective counts that."""
+        objective = self.scenario.objective
+        if objective.kind != "response":
+            return loads
+        return loads.with_facades(self.scenario.named_bays(layout), objective)
+
+    def known(self, layout: Sequence[Element], threat: LoadCase) -> BlastRecord | None:
+        """Return the complete record of a blast if it is stored."""
+        found = self.store.record(self.key(layout, threat), self.scenario)
+        if found is None:
+            return None
+        return replace(found, loads=self._responding(found.loads, tuple(layout)))
 
     def keep(self, layout: Sequence[Element], threat: LoadCase, loads: BlastLoads) -> None:
         """Cache and count the loads of a blast that ran elsewhere, with the same engine.
@@ -174,11 +241,7 @@ class BlastEvaluator:
         Raises:
             LayoutError: If the layout does not fit the build zone.
         """
-        self._keep(self.key(layout, threat), loads)
-
-    def knows(self, layout: Sequence[Element], threat: LoadCase) -> bool:
-        """Return whether the loads of a blast are stored."""
-        return self.store.get(self.key(layout, threat), self.scenario) is not None
+        self._keep(self.key(layout, threat), BlastRecord(loads))
 
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
@@ -188,10 +251,10 @@ class BlastEvaluator:
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
-    def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
+    def _keep(self, key: BlastKey, record: BlastRecord) -> None:
         """Count and store a blast."""
         self.counts.blasts += 1
-        self.store.add(key, loads)
+        self.store.keep(key, record)
 
 
 def _run(
@@ -212,7 +275,7 @@ def _run(
     ]
     for index, of_lot in as_completed(engine.loads_at_once, work, processes):
         for key, loads in zip(lots[index], of_lot, strict=True):
-            missing[key][0]._keep(key, loads)
+            missing[key][0]._keep(key, BlastRecord(loads))
             yield key, loads
 
 
@@ -244,6 +307,21 @@ def loads_together(
             own = own.with_facades(evaluator.scenario.named_bays(layout), objective)
         loads.append(own)
     return loads
+
+
+def engine_text(engine: Engine) -> str:
+    """Return the text of an engine in a key: class, name, version and any dataclass fields.
+
+    Engines of one class, name and version that are not dataclasses count as equal.
+    """
+    kind = f"{type(engine).__module__}.{type(engine).__qualname__}"
+    fields = repr(engine) if dataclasses.is_dataclass(engine) else ""
+    return f"{kind} {engine.name} {engine.version} {fields}".rstrip()
+
+
+def calibration_digest(calibration: Calibration) -> str:
+    """Return the SHA-256 of a calibration, which distinguishes versions of the same name."""
+    return sha256(calibration.model_dump_json().encode()).hexdigest()
 
 
 _MOST_EVALUATORS: Final = 4

@@ -5,9 +5,8 @@ from math import isnan
 
 import numpy as np
 
-from blast_env.evaluation.answers import percent, points
-from blast_env.evaluation.comparison import Evaluation
-from blast_env.geometry import Layout, layout_counts
+from blast_env.evaluation.questions.reduction import Evaluation
+from blast_env.geometry import Layout
 from blast_env.plots.plan import (
     EXPLOSIVE,
     INK,
@@ -34,7 +33,6 @@ from blast_env.plots.style import (
     unit_interval,
 )
 from blast_env.site import Scenario
-from blast_env.statistics import Estimate
 from blast_env.values import count_of
 
 with render_extra():
@@ -128,7 +126,7 @@ _MOST_UPRIGHT_NAMES = 16
 _MOST_UPRIGHT_LETTERS = 64
 
 
-def evaluation_figure(evaluation: Evaluation) -> Figure:
+def evaluation_figure(evaluation: Evaluation, title: str) -> Figure:
     """Return a figure of an evaluation.
 
     On the left the site with the layout and all charges, coloured by the reduction of their
@@ -136,6 +134,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
 
     Args:
         evaluation: The evaluation.
+        title: Its title.
     """
     site = evaluation.scenario.site
     least_in, most_in = _PLAN_WIDTHS_IN
@@ -149,20 +148,11 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     plan.add_line(_worst_ring(*evaluation.worst.charge.position_m))
     _draw_threats(threats, evaluation)
     write_legend(figure, [*_charge_legend(evaluation), *legend_of(features)])
-    write_heading(figure, _title(evaluation), _subtitle(evaluation))
+    write_heading(figure, title, _subtitle(evaluation))
     trim_height(figure, [plan])
     charges = [charge_feature(each.charge, "charge") for each in evaluation.outcomes]
     write_names(plan, [*features, *charges])
     return figure
-
-
-def _title(evaluation: Evaluation) -> str:
-    layout = evaluation.layout
-    barrier = layout_counts(layout, "barrier") if layout else "no barrier"
-    noun = evaluation.scenario.objective.noun
-    share, error = evaluation.mean_reduction, evaluation.reduction_error
-    reduction = f"reduction of the {noun} {_with_error(share, error)}"
-    return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
 
 
 def _subtitle(evaluation: Evaluation) -> str:
@@ -179,20 +169,6 @@ def _subtitle(evaluation: Evaluation) -> str:
 
 def _percent(share: float) -> str:
     return "-" if isnan(share) else f"{_PERCENT * share:z.0f} %"
-
-
-def _with_error(share: float, error: float) -> str:
-    """Return a reduction with its grid error, if there is one."""
-    if isnan(error):
-        return _percent(share)
-    return f"{percent(share)} \N{PLUS-MINUS SIGN} {points(error)} (cells)"
-
-
-def _interval(reduction: Estimate) -> str:
-    """Return the interval in words; nothing for a single threat."""
-    if np.isnan(reduction.low):
-        return ""
-    return f" (95 %: {_percent(reduction.low)} to {_percent(reduction.high)})"
 
 
 def _draw_threats(axes: Axes, evaluation: Evaluation) -> None:
@@ -238,7 +214,8 @@ def _load_text(evaluation: Evaluation, load: float) -> str:
 def _load_name(evaluation: Evaluation) -> str:
     """Return the name of the loads: that of one structure, or a weighted sum."""
     noun = evaluation.scenario.objective.noun
-    protected = evaluation.blasts[0][0].protected
+    first = evaluation.blasts.records[evaluation.blasts.judged][0]
+    protected = first.loads.protected
     weighted = len(protected) > 1 or protected[0].weight != 1.0
     return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
 

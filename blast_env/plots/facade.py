@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from blast_env.evaluation.consequences import BuildingResponse
+from blast_env.evaluation.questions.verdict import BuildingResponse
 from blast_env.plots.style import render_extra
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import Bay, FacadeResponse

@@ -156,18 +156,42 @@ def record_planes(
     Raises:
         BlastEnvError: If a plane is outside the grid.
     """
-    made: list[tuple[Snapshots, Snapshots]] = []
-    scale = cbrt(blast.site.charge.tnt_kg / 100.0)
-    times_s = (scale * np.arange(0.0, _LONGEST_S, _EVERY_S)).tolist()
-    section = section or default_section(blast.site)
+    planes = PlaneRecorder(blast, section, height_m)
+    result = blast.run(progress, lambda grid: (*planes.recorders(grid), *recorders(grid)))
+    return planes.shot(result)
 
-    def all_recorders(grid: GasGrid) -> Sequence[Recorder]:
-        made.append(_planes_of(grid, blast.site, section, height_m, times_s))
-        return (*made[0], *recorders(grid))
 
-    result = blast.run(progress, all_recorders)
-    opening = spherical_stage(result.run.charge, result.run.remap_radius_m)
-    return PressureShot(result, section, opening, made[0])
+class PlaneRecorder:
+    """Records pictures of two planes of a blast; see `record_planes`.
+
+    Args:
+        blast: The blast.
+        section: The section; by default `default_section`.
+        height_m: Height of the plan.
+    """
+
+    def __init__(
+        self,
+        blast: GasBlast,
+        section: VerticalSection | None = None,
+        height_m: float = PLAN_HEIGHT_M,
+    ) -> None:
+        self._site, self._height_m = blast.site, height_m
+        self._section = section or default_section(blast.site)
+        self._planes: tuple[Snapshots, Snapshots] | None = None
+
+    def recorders(self, grid: GasGrid) -> tuple[Recorder, ...]:
+        """Return the recorders of a grid, as for `GasBlast.run`."""
+        scale = cbrt(self._site.charge.tnt_kg / 100.0)
+        times_s = (scale * np.arange(0.0, _LONGEST_S, _EVERY_S)).tolist()
+        self._planes = _planes_of(grid, self._site, self._section, self._height_m, times_s)
+        return self._planes
+
+    def shot(self, result: GasResult) -> PressureShot:
+        """Return the pictures of the finished blast."""
+        assert self._planes is not None, "the blast was run without the recorders"
+        opening = spherical_stage(result.run.charge, result.run.remap_radius_m)
+        return PressureShot(result, self._section, opening, self._planes)
 
 
 def _planes_of(

@@ -6,7 +6,7 @@ from typing import Final
 
 import shapely
 
-from blast_env.evaluation.screening import ScreenedThreat, Screening
+from blast_env.evaluation.questions.screening import ScreenedThreat, Screening
 from blast_env.geometry import Layout
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.plan import Kinds, charge_feature, site_features, without

@@ -7,12 +7,15 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.consequences import Consequences
-from blast_env.geometry import Layout
+from blast_env.evaluation.blasts import Blasts
+from blast_env.evaluation.engines.gas import GasBlast, RecordedBlast
+from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.gas.engine import Recorders
+from blast_env.geometry import Layout, Rectangle
 from blast_env.plots.facade import facade_picture
 from blast_env.plots.figures import png_of
 from blast_env.plots.gas import KINDS, facades
-from blast_env.plots.ground_map import threshold_map
+from blast_env.plots.ground_map import ground_recorders, threshold_map
 from blast_env.plots.plan import (
     INK,
     QUIET_INK,
@@ -28,9 +31,8 @@ from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 from blast_env.plots.site_picture import plan_figure
 from blast_env.plots.site_plan import draw_plan, rectangle_patch, trim_height, write_names
 from blast_env.plots.style import render_extra, unit_interval
-from blast_env.report.loads import MeasuredBlast, ReportedBuilding
-from blast_env.report.outcomes import ItemWorth
 from blast_env.site import Scenario
+from blast_env.site.structures import buildings_of
 from blast_env.units import MODULE_SIDE_M, MS_PER_S, PA_PER_KPA
 
 with render_extra():
@@ -83,32 +85,55 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
 # A threat.
 
 
-def blast_pictures(unprotected: MeasuredBlast, protected: MeasuredBlast) -> tuple[Picture, ...]:
+class ThreatPictures:
+    """Draws a threat: first without the layout, then with it, while both results are in memory."""
+
+    def __init__(self) -> None:
+        self._drawn: list[RecordedBlast] = []
+
+    def recorders(self, _: GasBlast) -> Recorders:
+        """Return what makes the recorders of the ground."""
+        return ground_recorders
+
+    def draw(self, found: RecordedBlast) -> None:
+        """Keep a blast until `pictures`."""
+        self._drawn.append(found)
+
+    def pictures(self, blasts: Blasts) -> tuple[Picture, ...]:
+        """Return the pictures of the damage, the risk, and the loads of both blasts."""
+        unprotected, protected = self._drawn
+        sides = (consequences_of(blasts, name) for name in blasts.layouts)
+        return (
+            *damage_pictures(*sides),
+            risk_picture(unprotected, protected),
+            *blast_pictures(unprotected, protected),
+        )
+
+
+def blast_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> tuple[Picture, ...]:
     """Return the unfolded facades of the protected buildings, and the histories on them."""
     pictures: list[Picture] = []
-    for target in protected.targets:
-        if not target.protected or target.name not in protected.loads:
+    structures = protected.result.blast.scenario.structures
+    for name, parts in buildings_of(structures).items():
+        known = name in protected.record.complete.buildings
+        if not (known and any(each.protected for each in parts)):
             continue
-        pictures.append(_history(unprotected, protected, target))
+        pictures.append(_history(unprotected, protected, name))
         for quantity, kind in KINDS.items():
-            figure = facades(protected.result, target.name, quantity, unprotected.result)
-            pictures.append((f"{target.name}: {kind.name}, walls unfolded", png(figure)))
+            figure = facades(protected.result, name, quantity, unprotected.result)
+            pictures.append((f"{name}: {kind.name}, walls unfolded", png(figure)))
     return tuple(pictures)
 
 
-def _history(
-    unprotected: MeasuredBlast,
-    protected: MeasuredBlast,
-    target: ReportedBuilding,
-) -> Picture:
+def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str) -> Picture:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
-    wall = unprotected.loads[target.name].wall
+    wall = unprotected.record.complete.buildings[building].wall
     figure, axes = _page(2.6)
     for measured, colour, words in (
         (unprotected, _BARE, "no barrier"),
         (protected, _WALLED, "layout"),
     ):
-        pressure = measured.histories.of(target.name, wall)
+        pressure = measured.histories.of(building, wall)
         if pressure is not None:
             axes.plot(
                 MS_PER_S * measured.histories.time_s,
@@ -124,7 +149,7 @@ def _history(
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9, frameon=False)
-    return f"{target.name}: overpressure over time, mean over its {wall} wall", png(figure)
+    return f"{building}: overpressure over time, mean over its {wall} wall", png(figure)
 
 
 def damage_pictures(unprotected: Consequences, protected: Consequences) -> tuple[Picture, ...]:
@@ -143,7 +168,7 @@ def damage_pictures(unprotected: Consequences, protected: Consequences) -> tuple
     return tuple(pictures)
 
 
-def risk_picture(unprotected: MeasuredBlast, protected: MeasuredBlast) -> Picture:
+def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Picture:
     """Return the map of risk to windows and eardrums.
 
     The map without the layout stands beside it if the charge is at the same place in both.
@@ -157,20 +182,20 @@ def risk_picture(unprotected: MeasuredBlast, protected: MeasuredBlast) -> Pictur
 # The worth of items.
 
 
-def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
+def worth_map(scenario: Scenario, items: Sequence[tuple[Rectangle, float]]) -> bytes:
     """Return the layout with every module or piece in the colour of its worth."""
     figure, axes = _page(_WIDTH_IN)
     features = without(site_features(scenario), Kinds.CHARGE_PLACE)
     draw_plan(axes, features)
-    worths = 100.0 * np.array([each.worth for each in items])
+    worths = 100.0 * np.array([worth for _, worth in items])
     reach = max(float(np.abs(worths).max()), 1e-6)
     scale = TwoSlopeNorm(0.0, -reach, reach)
-    squares = [rectangle_patch(each.rectangle_m) for each in items]
+    squares = [rectangle_patch(rectangle_m) for rectangle_m, _ in items]
     modules = PatchCollection(squares, cmap="PuOr", norm=scale, edgecolor=unit_interval(INK))
     modules.set_array(worths)
     modules.set(linewidth=0.5, zorder=5)
     axes.add_collection(modules)
-    sides = np.array([each.rectangle_m for each in items])
+    sides = np.array([rectangle_m for rectangle_m, _ in items])
     low, high = sides[:, :2].min(axis=0), sides[:, 2:].max(axis=0)
     reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
     (left, bottom), (right, top) = low - reach_m, high + reach_m

@@ -14,13 +14,15 @@ from warnings import catch_warnings, filterwarnings
 import numpy as np
 import tomli_w
 
+from blast_env.answers.document import percent, worse
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation.answers import percent, worse
-from blast_env.evaluation.capacity import mass_near
-from blast_env.evaluation.consequences import Verdict
+from blast_env.evaluation.engines.peaks import PeakSource
 from blast_env.evaluation.engines.pieces import outcome_words
-from blast_env.evaluation.grid_error import FACTOR, ORDER
-from blast_env.evaluation.probability import level_probability, probability_text
+from blast_env.evaluation.questions.capacity import mass_near
+from blast_env.evaluation.questions.grid_error import FACTOR, ORDER
+from blast_env.evaluation.questions.probability import level_probability, probability_text
+from blast_env.evaluation.questions.verdict import Verdict
+from blast_env.evaluation.record import BuildingLoad
 from blast_env.files import scratch_folder, write_atomically, write_text
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import layout_counts
@@ -29,10 +31,7 @@ from blast_env.plots.plan import stand_off_text
 from blast_env.provenance import code_version, command, versions
 from blast_env.report.checks import checks_of
 from blast_env.report.figures import site_plan, worth_map
-from blast_env.report.loads import TargetLoad
-from blast_env.report.outcomes import LoadPair
-from blast_env.report.peaks import PeakSource
-from blast_env.report.study import Study
+from blast_env.report.study import LoadPair, Study
 from blast_env.report.threats import place_text
 from blast_env.report.verdict import StudyVerdict
 from blast_env.tables import table_records
@@ -192,7 +191,9 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "cells": " and ".join(dict.fromkeys(options.words)),
         "grid_error": study.grid_error,
         "index": {"ratio": options.ratio, "factor": FACTOR, "order": ORDER},
-        "worth_map": worth_map(scenario, study.items) if study.items else None,
+        "worth_map": worth_map(scenario, [each[1:] for each in study.worths])
+        if study.items
+        else None,
         "checked": CHECKED_SCALED_DISTANCE,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "command": " ".join(_quoted(part) for part in commands),
@@ -292,7 +293,7 @@ REFERENCES: Final = (
 
 
 def _spread(study: Study) -> tuple[float, float] | None:
-    found = [each.reduction for each in study.places if isfinite(each.reduction)]
+    found = [each.reduction for each in study.outcomes if isfinite(each.reduction)]
     return (min(found), max(found)) if found else None
 
 
@@ -370,10 +371,10 @@ def _error(value: float, digits: int | None = None) -> str:
     return f" {_PLUS_MINUS} {value:,.{digits}f}"
 
 
-def _counted(load: TargetLoad) -> str:
+def _counted(load: BuildingLoad) -> str:
     """Return the peak to compare with limits, and its source."""
-    peak, source = _number(load.counted.pa / PA_PER_KPA), load.counted.source
-    if source is PeakSource.GAS:
+    peak, source = _number(load.counted_pa / PA_PER_KPA), load.counted_by
+    if source == PeakSource.GAS:
         return f"{peak} ({source})"
     return f"{peak} ({source}; gas {_number(load.peak_pa / PA_PER_KPA)})"
 

@@ -1,44 +1,36 @@
-"""The study behind a report: its blasts and their results."""
+"""The study behind a report: its campaigns, and the results of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ThreatOutcome
-from blast_env.evaluation.consequences import Consequences, Severity, consequences_of
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.probability import Uncertainty
-from blast_env.evaluation.shared import keep_consequences
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase, LoadCaseSet, ThreatOutcome
+from blast_env.evaluation.blasts import NO_BARRIER, Blasts, Severity
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.engines.contract import Engine
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.questions.grid_error import GridError, impulse_of
+from blast_env.evaluation.questions.probability import Uncertainty
+from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.evaluation.record import BlastRecord, BuildingLoad
 from blast_env.gas.settings import Cells
-from blast_env.geometry import Element, Layout, layout_text, standing
+from blast_env.geometry import Element, Layout, Rectangle, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import LayoutState, check_layout
 from blast_env.report.details import ReportDetails
-from blast_env.report.figures import (
-    Picture,
-    blast_pictures,
-    damage_pictures,
-    risk_picture,
-)
-from blast_env.report.loads import (
-    MeasuredBlast,
-    ReportedBuilding,
-    TargetLoad,
-    measure,
-    targets_of,
-)
-from blast_env.report.outcomes import ItemWorth, Limit, LoadPair, check_limits
+from blast_env.report.figures import Picture, ThreatPictures
+from blast_env.report.limits import Limit, check_limits
 from blast_env.report.threats import chief_threats, other_places, requested_threats
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import as_completed
-from blast_env.site import AnyCharge, ObjectiveSection, Scenario
+from blast_env.site import AnyCharge, AnyStructure, ObjectiveSection, Scenario
+from blast_env.site.structures import buildings_of
+from blast_env.statistics import reductions
 
 MOST_THREATS: Final = 6
 _BARE, _WALLED = "without a barrier", "with the layout"
@@ -127,6 +119,105 @@ class StudyOptions:
         return coarse, fine
 
 
+@dataclass(frozen=True)
+class ReportedBuilding:
+    """A building: one structure, or several that form it.
+
+    Attributes:
+        name: Its name.
+        structures: The structures.
+    """
+
+    name: str
+    structures: tuple[AnyStructure, ...]
+
+    @property
+    def protected(self) -> bool:
+        """Whether its load counts."""
+        return any(each.protected for each in self.structures)
+
+    @property
+    def height_m(self) -> float | None:
+        """Its height; `None` for as high as the air."""
+        heights = [each.height_m for each in self.structures]
+        known = [height_m for height_m in heights if height_m is not None]
+        return max(known) if len(known) == len(heights) else None
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The rectangle around it."""
+        return Rectangle.around([each.rectangle_m for each in self.structures])
+
+
+def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
+    """Return the buildings of a scenario, protected ones first."""
+    together = buildings_of(scenario.structures)
+    targets = [ReportedBuilding(name, tuple(parts)) for name, parts in together.items()]
+    return tuple(sorted(targets, key=lambda each: not each.protected))
+
+
+@dataclass(frozen=True)
+class LoadPair:
+    """Loads on a building under a threat, without and with the layout, on one size of cells.
+
+    Attributes:
+        target: The building.
+        threat: The threat.
+        cells: The cells.
+        unprotected: Without the layout.
+        protected: With it.
+        error: The error of the cells; `None` without coarser ones.
+    """
+
+    target: ReportedBuilding
+    threat: LoadCase
+    cells: Cells
+    unprotected: BuildingLoad
+    protected: BuildingLoad
+    error: GridError | None
+
+    def impulse_of(self, record: BlastRecord) -> float:
+        """Return the impulse on the building in a blast, Pa s."""
+        return record.complete.buildings[self.target.name].impulse_pa_s
+
+    @property
+    def reduction(self) -> float:
+        """Share of the impulse that is gone; NaN if there is none."""
+        return reductions(self.protected.impulse_pa_s, self.unprotected.impulse_pa_s).item()
+
+    @property
+    def reduction_error(self) -> float:
+        """Error of the cells of the reduction, an absolute share; NaN with one size."""
+        return np.nan if self.error is None else self.error.of_reduction(self.impulse_of)
+
+    @property
+    def unprotected_error_pa_s(self) -> float:
+        """Error of the cells of the impulse without the layout; NaN with one size."""
+        share = np.nan if self.error is None else self.error.of_unprotected(self.impulse_of)
+        return share * self.unprotected.impulse_pa_s
+
+    @property
+    def protected_error_pa_s(self) -> float:
+        """Error of the cells of the impulse with the layout; NaN with one size."""
+        share = np.nan if self.error is None else self.error.of_load(self.impulse_of)
+        return share * self.protected.impulse_pa_s
+
+
+class ItemWorth(NamedTuple):
+    """The worth of one module or piece of the layout.
+
+    Attributes:
+        name: Its row and column, and its item if it is a piece.
+        rectangle_m: The ground that it covers.
+        worth: Growth of the impulse if it is left out, as a share of the impulse without a barrier,
+            mean over the threats; below 0 if the layout is better without it.
+    """
+
+    name: str
+    rectangle_m: Rectangle
+    worth: float
+
+
 @dataclass(frozen=True, eq=False)
 class Study:
     """The content of a report.
@@ -135,39 +226,22 @@ class Study:
         scenario: The scenario.
         layout: The layout.
         options: The options.
-        targets: The buildings.
-        threats: The threats.
-        bill: Bill of quantities of the layout; `blast_env.io.export.bill.BILL_COLUMNS`.
-        cost: Its cost.
-        pairs: Loads by threat, building and cell size.
-        unprotected: Response of the buildings without the layout, with the finer cells.
-        protected: Response of the buildings and of the barrier with it.
-        walled_coarse: The same with the coarser cells.
+        blasts: The blasts of the threats with the finer cells, without the layout and with it; all
+            of them on the coarser cells as well, unless there is one size.
         pictures: Facades and histories with the finer cells, by threat; none if it was stopped
             before those.
-        items: The worth of each module or piece, the most valuable one first.
-        places: Charges at other places.
-        notes: Reasons to distrust loads, by threat and cell size.
-        digests: Digest of every blast with pictures.
+        items: The blasts without each module or piece, with the coarser cells; `None` without.
+        places: Those of charges at other places, with the coarser cells; `None` without.
         stopped: The part before which it was stopped; empty for a whole report.
     """
 
     scenario: Scenario
     layout: Layout
     options: StudyOptions
-    targets: tuple[ReportedBuilding, ...]
-    threats: tuple[LoadCase, ...]
-    bill: pd.DataFrame
-    cost: float
-    pairs: tuple[LoadPair, ...]
-    unprotected: Consequences
-    protected: Consequences
-    walled_coarse: Consequences
-    pictures: dict[str, tuple[Picture, ...]]
-    items: tuple[ItemWorth, ...]
-    places: tuple[ThreatOutcome, ...]
-    notes: tuple[str, ...]
-    digests: tuple[tuple[str, str], ...]
+    blasts: Blasts
+    pictures: Mapping[str, tuple[Picture, ...]] = field(default_factory=dict)
+    items: Blasts | None = None
+    places: Blasts | None = None
     stopped: str = ""
 
     @property
@@ -177,9 +251,91 @@ class Study:
         return next(each for each in asked if each is not None)
 
     @property
+    def targets(self) -> tuple[ReportedBuilding, ...]:
+        """The buildings."""
+        return targets_of(self.scenario)
+
+    @property
+    def threats(self) -> tuple[LoadCase, ...]:
+        """The threats."""
+        return self.blasts.threats
+
+    @property
+    def bill(self) -> pd.DataFrame:
+        """Bill of quantities of the layout; `blast_env.io.export.bill.BILL_COLUMNS`."""
+        return bill_of_quantities(LayoutPlan(self.scenario, self.layout))
+
+    @property
+    def cost(self) -> float:
+        """The cost of the layout."""
+        return LayoutState.of(self.scenario, self.layout).cost
+
+    @cached_property
+    def unprotected(self) -> Consequences:
+        """Response of the buildings without the layout, with the finer cells."""
+        return consequences_of(self.blasts, NO_BARRIER)
+
+    @cached_property
+    def protected(self) -> Consequences:
+        """Response of the buildings and of the barrier with it."""
+        return consequences_of(self.blasts)
+
+    @cached_property
+    def walled_coarse(self) -> Consequences:
+        """The same with the coarser cells."""
+        return consequences_of(self.blasts.coarse or self.blasts)
+
+    @cached_property
+    def pairs(self) -> tuple[LoadPair, ...]:
+        """Loads by cell size, threat and building, the coarser cells first."""
+        coarse, fine = self.options.cells
+        found = () if self.blasts.coarse is None else self._pairs(self.blasts.coarse, coarse)
+        return (*found, *self._pairs(self.blasts, fine))
+
+    @property
     def fine(self) -> tuple[LoadPair, ...]:
         """Loads by threat and building with the finer cells."""
         return tuple(each for each in self.pairs if each.cells == self.options.cells[1])
+
+    def _pairs(self, blasts: Blasts, cells: Cells) -> tuple[LoadPair, ...]:
+        found = []
+        for number, threat in enumerate(blasts.threats):
+            protected, unprotected = (
+                each.complete.buildings for each in blasts.pairs(blasts.judged)[number]
+            )
+            error = GridError.of(blasts, number=number)
+            found += [
+                LoadPair(each, threat, cells, unprotected[each.name], protected[each.name], error)
+                for each in self.targets
+                if each.name in unprotected and each.name in protected
+            ]
+        return tuple(found)
+
+    @property
+    def _labelled(self) -> list[tuple[str, BlastRecord]]:
+        """The records of the threats with their labels, the coarser cells first."""
+        sizes = [self.blasts] if self.blasts.coarse is None else [self.blasts.coarse, self.blasts]
+        return [
+            (_label(threat, words, blasts.engine), record)
+            for blasts in sizes
+            for number, threat in enumerate(blasts.threats)
+            for words, record in zip(
+                (_WALLED, _BARE), blasts.pairs(blasts.judged)[number], strict=True
+            )
+        ]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Reasons to distrust loads, by threat and cell size."""
+        notes = (
+            f"{label}: {note}" for label, each in self._labelled for note in each.complete.notes
+        )
+        return tuple(dict.fromkeys(notes))
+
+    @property
+    def digests(self) -> tuple[tuple[str, str], ...]:
+        """Digest of every blast of the threats."""
+        return tuple((label, each.complete.digest) for label, each in self._labelled)
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -197,6 +353,33 @@ class Study:
         """Largest error of the cells of a reduction of the impulse; NaN with one size."""
         found = (each.reduction_error for each in self.fine if each.target.protected)
         return max((each for each in found if np.isfinite(each)), default=float("nan"))
+
+    @property
+    def worths(self) -> tuple[ItemWorth, ...]:
+        """The worth of every module or piece, by the impulse if it alone is left out."""
+        if self.items is None:
+            return ()
+        pieces = standing(self.layout)
+        impulses = np.array([self.items.values(name, impulse_of) for name in self.items.layouts])
+        unprotected, whole, without = impulses[0], impulses[1], impulses[2:]
+        worths = ((without - whole) / unprotected).mean(axis=1)
+        items = [
+            ItemWorth(
+                layout_text([element]),
+                self.scenario.zone.element_rectangle_m(element),
+                float(worth),
+            )
+            for element, worth in zip(pieces, worths, strict=True)
+        ]
+        return tuple(sorted(items, key=lambda each: -each.worth))
+
+    @property
+    def outcomes(self) -> tuple[ThreatOutcome, ...]:
+        """Charges at other places, by the impulse whatever counts in the site's objective."""
+        if self.places is None:
+            return ()
+        count = range(len(self.places.threats))
+        return tuple(ThreatOutcome.of(self.places, k, ObjectiveSection()) for k in count)
 
 
 Told = Callable[[str, float], None]
@@ -223,48 +406,11 @@ def run_study(
     cells = check_layout(scenario, layout)
     if not cells:
         raise BlastEnvError("the layout is empty: there is nothing to report on")
-    targets = targets_of(scenario)
-    check_limits(options.limits, targets)
+    check_limits(options.limits, [each.name for each in targets_of(scenario)])
     asked = requested_threats(scenario, options.charges)
     for threat in asked:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
-    bill = bill_of_quantities(LayoutPlan(scenario, cells))
-    runs = Runs(scenario, cells, options, targets, asked, progress)
-    items: tuple[ItemWorth, ...] = ()
-    places: tuple[ThreatOutcome, ...] = ()
-    part = options.words[1]
-    try:
-        if not asked:
-            runs.choose_threats()
-        runs.run_threats()
-        part = _ITEMS
-        items = runs.item_worths() if options.items else ()
-        part = _PLACES
-        places = runs.other_places()
-        part = ""
-    except KeyboardInterrupt:
-        options = runs.completed_options()
-        progress(f"stopped before: {part}", 1.0)
-    coarse, fine = options.cells
-    return Study(
-        scenario=scenario,
-        layout=cells,
-        options=options,
-        targets=targets,
-        threats=runs.threats,
-        bill=bill,
-        cost=LayoutState.of(scenario, cells).cost,
-        pairs=tuple(each for each in runs.pairs if each.cells in options.cells),
-        unprotected=runs.consequences(fine, protected=False),
-        protected=runs.consequences(fine, protected=True),
-        walled_coarse=runs.consequences(coarse, protected=True),
-        pictures=runs.pictures,
-        items=items,
-        places=places,
-        notes=tuple(dict.fromkeys(runs.notes)),
-        digests=tuple(runs.digests),
-        stopped=part,
-    )
+    return Runs(scenario, tuple(cells), options, progress).study(asked)
 
 
 class PlannedPart(NamedTuple):
@@ -296,7 +442,9 @@ def blasts_of(
     parts = [PlannedPart(_PLACES, coarse, tuple(first * len(both)))] if first else []
     last = options.sizes[-1]
     parts += [
-        PlannedPart(_label(threat, words, size), size, (threat.charge,), size == last)
+        PlannedPart(
+            _label(threat, words, GasEngine.with_cells(size)), size, (threat.charge,), size == last
+        )
         for size in (options.sizes[-1:] if first else options.sizes)
         for threat in threats
         for words in (_BARE, _WALLED)
@@ -319,9 +467,9 @@ def _fewer(layout: Layout) -> list[Layout]:
     return [tuple(each for each in layout if each != piece) for piece in standing(layout)]
 
 
-def _label(threat: LoadCase, words: str, cells: Cells) -> str:
+def _label(threat: LoadCase, words: str, engine: Engine) -> str:
     """Return the label of a blast of the threats, for progress and for its digest."""
-    return f"{threat.name} {words}, {GasEngine.with_cells(cells).cell_words}"
+    return f"{threat.name} {words}, {engine.words.partition(', ')[2]}"
 
 
 def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[LoadCase, ...]:
@@ -335,224 +483,101 @@ def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[LoadCase, ...
     return chief_threats(places, lambda _: Severity(), options.most_threats)
 
 
-class _Blast(NamedTuple):
-    """The numbers of a report from a blast, without its pressures and pictures.
+class Runs:
+    """The campaigns of a report, one part after the other; they share a store.
 
-    Attributes:
-        on_targets: Load on each building with a wall in the air, by name.
-        found: Response of buildings and barrier.
-        loads: Loads on the structures.
-        notes: Reasons to distrust the loads.
-        digest: Digest of the blast.
+    Args:
+        scenario: The scenario.
+        layout: The layout.
+        options: The options.
+        progress: Called with the label of the current part, and its completed share.
     """
 
-    on_targets: dict[str, TargetLoad]
-    found: Consequences
-    loads: BlastLoads
-    notes: tuple[str, ...]
-    digest: str
-
-    @classmethod
-    def of(cls, measured: MeasuredBlast) -> "_Blast":
-        result = measured.result
-        found = consequences_of(result.blast.scenario, result, result.run.site.charge)
-        return cls(measured.loads, found, result.loads(), measured.notes, result.digest)
-
-
-def _measured(work: tuple[GasBlast, tuple[ReportedBuilding, ...]]) -> _Blast:
-    """Run a blast, in this process or a worker."""
-    return _Blast.of(measure(*work))
-
-
-class Runs:
-    """The blasts of a report, one part after the other; each is run once."""
-
     def __init__(
-        self,
-        scenario: Scenario,
-        layout: Layout,
-        options: StudyOptions,
-        targets: tuple[ReportedBuilding, ...],
-        threats: tuple[LoadCase, ...],
-        progress: Told,
+        self, scenario: Scenario, layout: Layout, options: StudyOptions, progress: Told
     ) -> None:
-        self.scenario, self.layout, self.options = scenario, layout, options
-        self.targets, self.threats, self.progress = targets, threats, progress
-        self.pairs: list[LoadPair] = []
-        self.pictures: dict[str, tuple[Picture, ...]] = {}
-        self.notes: list[str] = []
-        self.digests: list[tuple[str, str]] = []
-        self._ahead: dict[tuple[Layout, LoadCase], _Blast] = {}
-        self._found: dict[tuple[Cells, bool], list[Consequences]] = {}
-        self._evaluators = {
-            size: BlastEvaluator(scenario, GasEngine.with_cells(size), cache=options.cache)
-            for size in options.sizes
-        }
-        self._evaluator = self._evaluators[options.cells[0]]
+        self.scenario, self.layout = scenario, layout
+        self.options, self.progress = options, progress
+        self._store = BlastStore(options.cache)
+        self._both = {NO_BARRIER: (), _WALLED: layout}
 
-    def run_threats(self) -> None:
-        """Run every threat with both sizes of cells, without and with the layout.
-
-        The coarser ones come first: they suffice for a report if the rest is stopped.
-        """
-        *coarser, fine = self.options.sizes
-        for size in coarser:
-            for threat in self.threats:
-                self._keep(threat, size, *(self._coarse(threat, each) for each in self._layouts))
-        for threat in self.threats:
-            both = [self._measured(threat, fine, layout) for layout in self._layouts]
-            self._keep(threat, fine, *map(_Blast.of, both))
-            # Drawn now, because only these two results are in memory at once.
-            unprotected, protected = (
-                self._found[fine, is_walled][-1] for is_walled in (False, True)
-            )
-            self.pictures[threat.name] = (
-                *damage_pictures(unprotected, protected),
-                risk_picture(*both),
-                *blast_pictures(both[0], both[1]),
-            )
-
-    @property
-    def _layouts(self) -> tuple[Layout, Layout]:
-        return (), self.layout
-
-    def completed_options(self) -> StudyOptions:
-        """Return the options of a report on the finished cells, perhaps the coarser ones alone.
+    def study(self, asked: tuple[LoadCase, ...]) -> Study:
+        """Run the parts, and return what was finished before an interruption.
 
         Raises:
-            KeyboardInterrupt: If not even these are finished.
+            KeyboardInterrupt: If not even the coarser cells were finished.
         """
-        count = len(self.threats)
-        done = [
-            size
-            for size in self.options.cells
-            if count and len(self._found.get((size, True), ())) == count
-        ]
-        if not done:
-            raise KeyboardInterrupt
-        if len(self.pictures) < count:
-            self.pictures.clear()
-        return replace(self.options, cells=(done[0], done[-1]))
+        part, threats, blasts = _PLACES, asked, list[Blasts]()
+        pictures: dict[str, tuple[Picture, ...]] = {}
+        items = places = None
+        try:
+            threats = asked or self.choose_threats()
+            for size in self.options.sizes:
+                part = GasEngine.with_cells(size).cell_words
+                drawn = pictures if size == self.options.sizes[-1] else None
+                blasts.append(self._on_threats(size, threats, drawn))
+            part = _ITEMS
+            items = self.without_items(threats) if self.options.items else None
+            part = _PLACES
+            places = self.other_places()
+            part = ""
+        except KeyboardInterrupt:
+            if not blasts:
+                raise
+            self.progress(f"stopped before: {part}", 1.0)
+        cells = self.options.sizes
+        options = replace(self.options, cells=(cells[0], cells[len(blasts) - 1]))
+        fine = blasts[-1] if len(blasts) < 2 else replace(blasts[-1], coarse=blasts[0])
+        if len(blasts) < len(cells):
+            pictures.clear()
+        return Study(self.scenario, self.layout, options, fine, pictures, items, places, part)
 
-    def consequences(self, cells: Cells, *, protected: bool) -> Consequences:
-        """Return the consequences of all threats on the given cells, without or with the layout."""
-        return Consequences.together(self._found[cells, protected])
+    def _campaign(
+        self, layouts: Mapping[str, Layout], threats: Sequence[LoadCase], cells: Cells
+    ) -> Campaign:
+        evaluator = BlastEvaluator(self.scenario, GasEngine.with_cells(cells), cache=self._store)
+        case = LoadCaseSet(self.scenario, tuple(threats))
+        return Campaign(case, layouts, evaluator, processes=self.options.processes)
 
-    def _blast(self, threat: LoadCase, cells: Cells, layout: Layout) -> GasBlast:
-        return GasBlast(self.scenario, layout, 0, GasEngine.with_cells(cells), threat.charge)
+    def _on_threats(
+        self,
+        cells: Cells,
+        threats: Sequence[LoadCase],
+        pictures: dict[str, tuple[Picture, ...]] | None,
+    ) -> Blasts:
+        """Run every threat with cells of one size, blast by blast; draw those of the finer ones."""
+        whole = self._campaign(self._both, threats, cells)
+        for threat in threats:
+            drawing = None if pictures is None else ThreatPictures()
+            for name, words in zip(self._both, (_BARE, _WALLED), strict=True):
+                label = _label(threat, words, whole.evaluator.engine)
+                one = self._campaign({name: self._both[name]}, [threat], cells)
+                one.run(partial(self.progress, label), drawing)
+            if pictures is not None and drawing is not None:
+                both = self._campaign(self._both, [threat], cells).run()
+                pictures[threat.name] = drawing.pictures(both)
+        return whole.run()
 
-    def _coarse(self, threat: LoadCase, layout: Layout) -> _Blast:
-        """Return a blast with the coarser cells, which may be among those run ahead."""
-        if (layout, threat) in self._ahead:
-            return self._ahead[layout, threat]
-        return _Blast.of(self._measured(threat, self.options.cells[0], layout))
-
-    def _measured(self, threat: LoadCase, cells: Cells, layout: Layout) -> MeasuredBlast:
-        label = _label(threat, _WALLED if layout else _BARE, cells)
-        progress = partial(self.progress, label)
-        return measure(self._blast(threat, cells, layout), self.targets, progress)
-
-    def _keep(self, threat: LoadCase, cells: Cells, unprotected: _Blast, protected: _Blast) -> None:
-        """Keep the numbers of both blasts of a threat."""
-        for layout, words, each in (((), _BARE, unprotected), (self.layout, _WALLED, protected)):
-            label = _label(threat, words, cells)
-            self.notes += [f"{label}: {note}" for note in each.notes]
-            self.digests.append((label, each.digest))
-            self._found.setdefault((cells, bool(layout)), []).append(each.found)
-            self._evaluators[cells].keep(layout, threat, each.loads)
-            keep_consequences(self._evaluators[cells], layout, threat.charge, each.found)
-        coarser = {
-            each.target.name: each
-            for each in self.pairs
-            if each.threat is threat and self.options.ratio > 1.0
-        }
-        for target in self.targets:
-            if target.name in unprotected.on_targets and target.name in protected.on_targets:
-                loads = unprotected.on_targets[target.name], protected.on_targets[target.name]
-                coarse = coarser.get(target.name)
-                ratio = self.options.ratio
-                self.pairs.append(LoadPair(target, threat, cells, *loads, coarse, ratio))
-
-    def other_places(self) -> tuple[ThreatOutcome, ...]:
-        """Return the outcomes of the charges at other places."""
-        places = other_places(self.scenario, self.options.places)
-        return self._outcomes(_PLACES, places)
-
-    def choose_threats(self) -> None:
-        """Choose the worst places as threats, by loads with the layout, as in the verdict.
-
-        Their blasts with the coarser cells are kept for `run_threats`.
-        """
-        places = other_places(self.scenario, self.options.places)
-        if len(self.options.sizes) > 1:
-            self._run_ahead(places)
-        loads = self._blasts(_PLACES, self._layouts, places)[len(places) :]
+    def choose_threats(self) -> tuple[LoadCase, ...]:
+        """Return the worst places as threats, by loads with the layout, as in the verdict."""
+        places = self.other_places()
         objective = self.scenario.objective
-        severities = (Severity.of_loads(each, objective) for each in loads)
-        found = dict(zip(places, severities, strict=True))
-        self.threats = chief_threats(places, lambda each: found[each], self.options.most_threats)
-        self._ahead = {key: each for key, each in self._ahead.items() if key[1] in self.threats}
+        loads = [each.loads for each in places.records[places.judged]]
+        found = {
+            each: Severity.of_loads(load, objective)
+            for each, load in zip(places.threats, loads, strict=True)
+        }
+        most = self.options.most_threats
+        return chief_threats(places.threats, lambda each: found[each], most)
 
-    def _run_ahead(self, places: Sequence[LoadCase]) -> None:
-        """Run and measure the blasts at places that the store lacks."""
-        asked = [
-            (layout, place)
-            for layout in self._layouts
-            for place in places
-            if not self._evaluator.knows(layout, place)
-        ]
-        size = self.options.cells[0]
-        work = [(self._blast(place, size, layout), self.targets) for layout, place in asked]
-        for done, (index, blast) in enumerate(
-            as_completed(_measured, work, self.options.processes), start=1
-        ):
-            self._ahead[asked[index]] = blast
-            self._evaluator.keep(*asked[index], blast.loads)
-            self.progress(_PLACES, done / len(work))
+    def other_places(self) -> Blasts:
+        """Return the blasts of the charges at other places."""
+        places = other_places(self.scenario, self.options.places)
+        campaign = self._campaign(self._both, places, self.options.cells[0])
+        return campaign.run(partial(self.progress, _PLACES))
 
-    def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[ThreatOutcome, ...]:
-        loads = self._blasts(label, self._layouts, charges)
-        unprotected, protected = loads[: len(charges)], loads[len(charges) :]
-        # The page has impulses there, whatever counts in the objective of the scenario.
-        site = self.scenario.model_copy(update={"objective": ObjectiveSection()})
-        return tuple(
-            map(
-                partial(ThreatOutcome.of, site, self.layout),
-                charges,
-                protected,
-                unprotected,
-            )
-        )
-
-    def item_worths(self) -> tuple[ItemWorth, ...]:
-        """Return the worth of every module or piece, by the impulse if it alone is left out."""
-        pieces = standing(self.layout)
-        layouts = ((), self.layout, *_fewer(self.layout))
-        impulses = self._loads(_ITEMS, layouts, self.threats)
-        unprotected, whole, without = impulses[0], impulses[1], impulses[2:]
-        worths = ((without - whole) / unprotected).mean(axis=1)
-        items = [
-            ItemWorth(
-                layout_text([element]),
-                self.scenario.zone.element_rectangle_m(element),
-                float(worth),
-            )
-            for element, worth in zip(pieces, worths, strict=True)
-        ]
-        return tuple(sorted(items, key=lambda each: -each.worth))
-
-    def _loads(
-        self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
-    ) -> FloatArray:
-        """Return the impulses on the protected structures, Pa s (layouts, threats)."""
-        blasts = self._blasts(label, layouts, threats)
-        counted = [each.protected_impulse_pa_s for each in blasts]
-        return np.asarray(np.reshape(counted, (len(layouts), len(threats))))
-
-    def _blasts(
-        self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
-    ) -> list[BlastLoads]:
-        """Return the loads of every layout under every threat, from the store if possible."""
-        pairs = [(layout, threat) for layout in layouts for threat in threats]
-        progress = partial(self.progress, label)
-        return self._evaluator.loads_of_many(pairs, self.options.processes, progress)
+    def without_items(self, threats: Sequence[LoadCase]) -> Blasts:
+        """Return the blasts without a barrier, with the layout, and without each item of it."""
+        fewer = {str(number): each for number, each in enumerate(_fewer(self.layout))}
+        campaign = self._campaign(self._both | fewer, threats, self.options.cells[0])
+        return campaign.run(partial(self.progress, _ITEMS))

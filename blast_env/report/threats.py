@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.consequences import Severity
+from blast_env.evaluation.blasts import Severity
 from blast_env.geometry import Layout, Rectangle
 from blast_env.site import (
     AnyCharge,

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from blast_env.evaluation.consequences import (
+from blast_env.evaluation.questions.verdict import (
     BarrierResponse,
     BuildingSummary,
     Consequences,
     Verdict,
     other_glazing,
 )
-from blast_env.report.loads import TargetLoad
-from blast_env.report.outcomes import Limit, LoadPair
-from blast_env.report.study import Study
+from blast_env.evaluation.record import BuildingLoad
+from blast_env.report.limits import Limit
+from blast_env.report.study import LoadPair, Study
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.values import count_of
 
@@ -55,7 +55,7 @@ class Side(NamedTuple):
         cls,
         found: Consequences,
         target: LevelOfProtection,
-        loads: Sequence[tuple[Limit, TargetLoad]],
+        loads: Sequence[tuple[Limit, BuildingLoad]],
     ) -> "Side":
         """Return the verdict by the level of the buildings, and by limits of loads."""
         kept = all(limit.is_kept(load) for limit, load in loads)

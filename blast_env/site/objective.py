@@ -90,7 +90,7 @@ class ObjectiveSection(Section):
             in a bay, by the area of bays; `"glazing"` that of windows alone, by the area of panes.
         target: Level of protection of the response to reach under every charge.
         target_probability: Least probability of the target, in judgements of layouts
-            (`blast_env.evaluation.probability`); the objective itself does not depend on it.
+            (`blast_env.evaluation.questions.probability`); the objective does not depend on it.
         quantity: Quantity of the load; peaks need the engine `gas`.
         reference_impulse_pa_s: Impulse that counts as 1 with `"both"`.
         reference_peak_pa: Peak overpressure that counts as 1 with `"both"`.

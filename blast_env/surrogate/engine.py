@@ -9,8 +9,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_env.compilation import compilation_notice
-from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
+from blast_env.evaluation.record import BlastLoads, StructureLoad
 from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines.contract import structure_response
+from blast_env.evaluation.record import structure_response
 from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.site import AnyStructure, Scenario

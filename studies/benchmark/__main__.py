@@ -10,6 +10,7 @@ import typer
 from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 
+from blast_env.answers.terminal import print_line
 from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
@@ -23,7 +24,7 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark.methods import reference_of, references_of
 from blast_env.benchmark.references import cell_key, engine_key, stored_references
-from blast_env.cli.output import print_line, user_errors
+from blast_env.cli.output import user_errors
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import write_atomically

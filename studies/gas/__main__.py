@@ -9,11 +9,11 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import CacheOption, ClusterAddress, resume_words, running_on
-from blast_env.cli.output import print_line, progress_bar, resumable, user_errors
+from blast_env.cli.output import progress_bar, resumable, user_errors
 from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
-from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import draw_charge
@@ -21,6 +21,7 @@ from blast_env.results import EndReason
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import Charge
+from blast_env.store import Store
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference, engine_with
@@ -109,7 +110,11 @@ def endings(
             for name, layout in layouts(site).items()
         }
         with progress_bar("blasts") as progress:
-            run = partial(ending, times=times, store=BlastStore.of(cache))
+            run = partial(
+                ending,
+                times=times,
+                store=None if cache is None else Store(cache / "endings.sqlite"),
+            )
             found = run_all(run, list(jobs.values()), processes, progress)
     headers = ("site", "layout", "end (ms)", "CPU (s)", "largest share missed of a wall")
     rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]

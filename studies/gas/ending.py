@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from blast_env.arrays import FloatArray
 from blast_env.design.rules import random_layout
-from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
+from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.geometry import Layout
 from blast_env.response.buildings import LevelOfProtection
@@ -19,6 +19,7 @@ from blast_env.response.facade import respond
 from blast_env.results import EndReason
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import FAMILIES, generate_site
+from blast_env.store import Store
 
 _LARGE_M: Final = 50.0
 
@@ -47,18 +48,18 @@ class Ending:
 _ENDING: Final = TypeAdapter(Ending)
 
 
-def ending(blast: GasBlast, times: float = 4.0, store: BlastStore | None = None) -> Ending:
+def ending(blast: GasBlast, times: float = 4.0, store: Store | None = None) -> Ending:
     """Run a blast to its end, and continue its gas to `times` times that time.
 
     What is in the store is not run again.
     """
-    known = BlastStore() if store is None else store
     inputs = BlastEvaluator(blast.scenario, blast.engine).key(blast.layout, LoadCase(blast.threat))
     key = json.dumps(("ending", inputs, times))
-    found = known.read(key, _ENDING.validate_json)
+    found = None if store is None else store.read(key, _ENDING.validate_json)
     if found is None:
         found = _ending(blast, times)
-        known.put(key, _ENDING.dump_json(found))
+        if store is not None:
+            store.put(key, _ENDING.dump_json(found))
     return found
 
 

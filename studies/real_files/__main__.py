@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from blast_env.cli.output import print_line, user_errors
+from blast_env.answers.terminal import print_line
+from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.io.importing.ledger import FATES, Fate
 from studies.real_files.packages import fetch, listed

@@ -3,14 +3,16 @@
 import pickle
 from types import SimpleNamespace
 
+from blast_env.answers.document import TYPOGRAPHIC, Table
 from blast_env.app.jobs import Workers, do
-from blast_env.evaluation.answers import AnswerTable
 
 
-def rows_of(table: AnswerTable) -> list[SimpleNamespace]:
+def rows_of(table: Table) -> list[SimpleNamespace]:
     """Return the rows by headers without units: `its_probability`."""
     names = [each.partition(" (")[0].partition(":")[0].replace(" ", "_") for each in table.headers]
-    return [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in table.rows]
+    return [
+        SimpleNamespace(**dict(zip(names, row, strict=True))) for row in table.cells(TYPOGRAPHIC)
+    ]
 
 
 class Here(Workers):

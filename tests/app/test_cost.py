@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from blast_env.app.blasts import PICTURES, BlastPictures, Picture
 from blast_env.app.folder import WorkFolder
-from blast_env.app.records import RECORD
+from blast_env.app.kept import write_kept
 from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
+from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.gas import CostGuess, cost_words, time_words
 from blast_env.report import StudyOptions
@@ -52,7 +54,11 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
     (threat,) = session.chosen_threats()
     there = session.folder.blast_of(session.key((), threat))
     there.mkdir()
-    (there / RECORD).touch()
+    record = BlastPictures(pictures=(Picture(file="a.png", label="a"),), seconds=1.0, repeat={})
+    write_kept(record, there / PICTURES)
+    assert len(session.cost([0])) == 2  # its record is not there
+    evaluator = BlastEvaluator(session.scenario, session.engine, cache=session.work.cache)
+    evaluator.records_of_many([((), threat)])
     assert len(session.cost([0])) == 1
     assert len(session.cost_of_search(50)) == 50
 

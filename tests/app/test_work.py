@@ -8,37 +8,44 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 from pydantic import TypeAdapter
 
 from blast_env import report
+from blast_env.answers.compare import comparison, verdict_table
 from blast_env.app import blasts, offers
+from blast_env.app.blasts import PICTURES, BlastPictures
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Running, Workers, settle
-from blast_env.app.placing import plain
-from blast_env.app.records import (
-    BlastedLayout,
-    BlastRecord,
-    blast_key,
-    comparison,
-)
+from blast_env.app.kept import read_kept
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of, usual_threats
-from blast_env.app.verdicts import verdict_table
 from blast_env.app.work import Status, StatusWriter, read_status, write_status
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase, StructureLoad, evaluate_layout
+from blast_env.evaluation import (
+    BlastEvaluator,
+    BlastKey,
+    BlastLoads,
+    LoadCase,
+    LoadCaseSet,
+    StructureLoad,
+    evaluate_layout,
+)
+from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.record import BlastRecord
 from blast_env.geometry import Layout
 from blast_env.report import StudyOptions
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge, Scenario, load_scenario
 from tests.app.here import Here, rows_of
+from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.vehicle_sites import gate_site, vehicle_document
 
@@ -52,6 +59,9 @@ def session_on(folder: Path, scenario: Scenario, workers: Workers | None = None)
 
 def state_of(session: Session) -> Status:
     return session.jobs()[0][1]
+
+
+PLACES = (("near", 4.0), ("far", 1.5))
 
 
 @pytest.fixture(scope="module")
@@ -96,23 +106,20 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
         }
     )
 
-    def blast(threat: str, layout: Layout, impulse_pa_s: float, peak_kpa: float) -> BlastRecord:
+    def blast(impulse_pa_s: float, peak_kpa: float) -> BlastRecord:
         load = StructureLoad.on(site.structures[0], impulse_pa_s, 1e3 * peak_kpa)
-        return BlastRecord(
-            key="k",
-            threat=threat,
-            cells=0.5,
-            layout=plain(layout),
-            loads=(load,),
-            unchecked=(),
-            seconds=1.0,
-            repeat={},
-        )
+        return BlastRecord(BlastLoads((load,), np.zeros(0)))
 
-    unprotected = {"near": blast("near", (), 400.0, 100.0), "far": blast("far", (), 100.0, 50.0)}
-    own = {"near": blast("near", WALL, 200.0, 50.0), "far": blast("far", WALL, 100.0, 100.0)}
-    layouts = [BlastedLayout("no barrier", 0.0, unprotected), BlastedLayout("A", 6.0, own)]
-    table = comparison(layouts, ["near", "far"], site)
+    near, far = (LoadCase(Charge((2.0, y_m), 5.0), name=name) for name, y_m in PLACES)
+    records = {
+        "no barrier": (blast(400.0, 100.0), blast(100.0, 50.0)),
+        "A": (blast(200.0, 50.0), blast(100.0, 100.0)),
+    }
+    case, engine = LoadCaseSet(site, (near, far)), GasEngine()
+    layouts: dict[str, Layout] = {"no barrier": (), "A": WALL}
+    bare = Blasts(case, {"no barrier": ()}, records, engine)
+    both = Blasts(case, layouts, records, engine)
+    table = comparison({"no barrier": (bare, 0.0), "A": (both, 6.0)}, ["near", "far"], site)
     rows = {(row.layout, row.threat): row for row in rows_of(table)}
     counted = {key: float(row.counts) for key, row in rows.items()}
     assert counted[("no barrier", "near")] == 2.0 * 2.0 + 3.0 * 2.0
@@ -146,23 +153,25 @@ def test_a_building_of_several_parts_is_one_row(tmp_path: Path) -> None:
 
 
 def test_an_edit_takes_results_away_and_undo_brings_them_back(gas: Session) -> None:
-    before = gas.comparison()
+    before = gas.comparison().cells()
     gas.put("less", gas.design.with_layout(WALL[:5]))
     assert len(gas.comparison().rows) == 2  # no barrier alone
     gas.undo()
-    assert gas.comparison() == before
+    assert gas.comparison().cells() == before
 
 
 def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Session) -> None:
     assert state_of(gas).state == "done"
     (threat,) = gas.chosen_threats()
     result = GasBlast(glazed_hut(), WALL).run()
-    record = gas.folder.record_of(gas.shown(threat)[1].key)
+    key = gas.shown(threat)[1].key
+    record = read_kept(BlastPictures, gas.folder.blast_of(key) / PICTURES)
     assert record is not None
-    load = next(each for each in record.loads if each.name == "hut")
+    loads = gas.results()["A"].records["A"][0].loads.structures
+    load = next(each for each in loads if each.name == "hut")
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s)
     assert load.peak_pa == pytest.approx(float(result.structures["peak_pa"].iloc[0]))
-    folder = gas.folder.blast_of(record.key)
+    folder = gas.folder.blast_of(key)
     with Image.open(folder / "film.webp") as film:
         assert getattr(film, "n_frames", 1) == blasts.FRAMES
     assert {each.label for each in record.pictures} == {
@@ -179,7 +188,7 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
 
 def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None:
     (threat,) = gas.chosen_threats()
-    rows = rows_of(gas.verdicts())
+    rows = rows_of(verdict_table(gas.scenario, gas.verdicts()))
     assert [(row.layout, row.threat, row.building) for row in rows] == [
         ("no barrier", threat.name, "hut"),
         ("A", threat.name, "hut"),
@@ -196,29 +205,24 @@ def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None
 
 def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
     (threat,) = gas.chosen_threats()
-    own = gas.shown(threat)[1]
-    record = gas.folder.record_of(own.key)
-    assert record is not None
-    (judged,) = gas.judged(own, threat)
-    good = judged.summary._replace(level="high", broken=0.0)
-    milder = judged._replace(summary=good, severity=replace(judged.severity, lost_levels=0))
-    other = record.model_copy(update={"threat": "other"})
-    site = gas.scenario
-    rows = rows_of(verdict_table(site, [("A", other, [milder]), ("A", record, [judged])]))
-    assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
-    levels = [row.level_of_protection for row in rows]
-    assert levels[0] == levels[2] != levels[1] == "high"
-    fewer = judged._replace(
-        summary=judged.summary._replace(broken=0.0), severity=replace(judged.severity, damage=0.0)
-    )
-    rows = rows_of(verdict_table(site, [("A", other, [fewer]), ("A", record, [judged])]))
-    assert rows[0].level_of_protection == rows[1].level_of_protection
-    assert rows[0].panes_broken == rows[2].panes_broken != rows[1].panes_broken
+    (judged,) = gas.judged(gas.shown(threat)[1], threat)
+    site, (level, likely, panes, *others) = gas.scenario, judged.cells
+    for severity, cells in (
+        (replace(judged.severity, lost_levels=0), ("high", likely, "0", *others)),
+        (replace(judged.severity, damage=0.0), (level, likely, "0", *others)),
+    ):
+        milder = judged._replace(cells=cells, severity=severity)
+        table = verdict_table(site, [("A", "other", [milder]), ("A", threat.name, [judged])])
+        rows = rows_of(table)
+        assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
+        assert rows[0].panes_broken == rows[2].panes_broken != rows[1].panes_broken == "0"
+        assert rows[0].level_of_protection == rows[2].level_of_protection == level
+    assert panes != "0"
 
 
 def test_what_is_there_is_not_run_again(gas: Session) -> None:
     (threat,) = gas.chosen_threats()
-    path = gas.folder.blast_of(gas.shown(threat)[1].key) / "record.json"
+    path = gas.folder.blast_of(gas.shown(threat)[1].key) / PICTURES
     before = path.stat().st_mtime_ns
     gas.blast([0])
     assert path.stat().st_mtime_ns == before
@@ -235,21 +239,25 @@ def test_of_many_sources_the_worst_are_blasted_unless_others_are_chosen() -> Non
     assert len(named) == 6
 
 
-def test_keys_know_what_a_result_depends_on() -> None:
+def test_keys_know_what_a_record_depends_on() -> None:
     charge = Charge((2.0, 4.0), 5.0)
     assert [each.charge for each in threats_of(hut())] == [charge]
-    site = hut()
-    key = blast_key(site, WALL, charge, 0.5)
-    assert key == blast_key(site, WALL[::-1], charge, 0.5)
+
+    def key(
+        site: Scenario, layout: Layout = WALL, charge: Charge = charge, **cells: Any
+    ) -> BlastKey:
+        return BlastEvaluator(site, GasEngine(**cells)).key(layout, LoadCase(charge))
+
     others = {
-        blast_key(site, WALL[:-1], charge, 0.5),
-        blast_key(site, WALL, charge._replace(tnt_kg=6.0), 0.5),
-        blast_key(site, WALL, charge, 0.25),
-        blast_key(site, WALL, charge, "coarse"),
-        blast_key(glazed_hut(), WALL, charge, 0.5),  # with bays
-        blast_key(hut(objective={"quantity": "peak"}), WALL, charge, 0.5),
+        key(hut(), WALL[:-1]),
+        key(hut(), charge=charge._replace(tnt_kg=6.0)),
+        key(hut(), cell_m=0.25),
+        key(hut(), cells="coarse"),
+        key(glazed_hut()),  # with bays
+        key(hut(objective={"quantity": "peak"})),
     }
-    assert len(others | {key}) == 7
+    assert key(hut(), WALL[::-1]) == key(hut())
+    assert len(others | {key(hut())}) == 7
 
 
 COURTYARD = load_scenario("courtyard")
@@ -298,11 +306,9 @@ def test_a_blast_has_cells_that_grow(tmp_path: Path) -> None:
     assert cost == GasEngine(cells="coarse").cost(session.scenario, threat.charge)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
-    unprotected, *_ = session.shown(threat)
-    record = session.folder.record_of(unprotected.key)
-    assert record is not None
+    (record,) = session.results()["no barrier"].records["no barrier"]
     result = GasBlast(session.scenario, (), 0, GasEngine(cells="coarse"), threat.charge).run()
-    load = next(each for each in record.loads if each.name == "hut")
+    load = next(each for each in record.loads.structures if each.name == "hut")
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s, rel=1e-6)
 
 
@@ -340,8 +346,9 @@ def test_of_several_threats_the_worst_one_gives_the_error(tmp_path: Path) -> Non
     session.threats = (start, end)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
-    there = session.folder.coarse_there()
-    assert there == {session.key((), threats_of(session.scenario)[2])}  # nearest to the hut
+    coarse = session.results()["no barrier"].coarse
+    assert coarse is not None
+    assert coarse.threats == (threats_of(session.scenario)[2],)  # nearest to the hut
     rows = rows_of(session.comparison())
     assert [row.threat.split(":")[0] for row in rows] == [start, start, end, end, "all 2"]
     assert all("\N{PLUS-MINUS SIGN}" in row.impulse for row in rows)
@@ -398,12 +405,11 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     session.take(state_of(session), 0)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
-    unprotected, posts = (session.folder.record_of(each.key) for each in session.shown(nearest))
-    assert unprotected is not None
-    assert posts is not None
-    assert unprotected.repeat["charge"][0] == [9.0, 4.0]
-    assert posts.repeat["charge"][0][0] <= 3.0
-    assert posts.loads[0].impulse_pa_s < 0.6 * unprotected.loads[0].impulse_pa_s
+    blasts = session.results()["A"]
+    assert blasts.charge("no barrier", 0).position_m == (9.0, 4.0)
+    assert blasts.charge("A", 0).position_m[0] <= 3.0
+    ((unprotected,), (posts,)) = blasts.records.values()
+    assert posts.loads.protected_impulse_pa_s < 0.6 * unprotected.loads.protected_impulse_pa_s
     again = TypeAdapter(LoadCase).validate_json(TypeAdapter(LoadCase).dump_json(nearest))
     assert again.charge == nearest.charge != second.charge
 

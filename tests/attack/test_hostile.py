@@ -18,15 +18,15 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env import Charge, load_scenario, simulate
+from blast_env.answers.document import Table
+from blast_env.answers.terminal import print_parts
 from blast_env.benchmark import Run, Submission, make
 from blast_env.benchmark.methods import find_method
 from blast_env.calibration import fit_power_law, kingery_bulmash, load_calibration
 from blast_env.cli import app
-from blast_env.cli.output import print_table
 from blast_env.documents import DocumentError, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_layout
-from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
@@ -274,8 +274,8 @@ def test_foreign_texts_reach_neither_terminal_nor_page_as_they_are(
     text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     submission = Submission(text, (Run("control_room-known-v2", 0, 0, 0, ()),), text)
-    table = AnswerTable(submission.method, ("method",), ((text,),))
-    print_table(table.title, table.headers, table.rows)
+    table = Table(submission.method, ("method",), ((text,),))
+    print_parts([table])
     assert STEERING.search(capsys.readouterr().out) is None
     page = markdown_table(("note",), [(markup_text(submission.note),)])
     marks = ("<script", "[here](javascript", "\n# Heading", "{raw}`", "\x1b", "\u202e")

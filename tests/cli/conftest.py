@@ -5,9 +5,9 @@ from functools import partial
 
 import pytest
 
+from blast_env.answers import assess
 from blast_env.design.search import advised
-from blast_env.evaluation import assessment
-from blast_env.evaluation.probability import level_probability
+from blast_env.evaluation.questions.probability import level_probability
 from tests.figures import undrawn_package as undrawn_package
 
 
@@ -15,6 +15,6 @@ from tests.figures import undrawn_package as undrawn_package
 def _probabilities_of_few_draws() -> Iterator[None]:
     """Draw a tenth of what commands draw."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (advised, assessment):
+        for module in (advised, assess):
             patch.setattr(module, "level_probability", partial(level_probability, draws=100))
         yield

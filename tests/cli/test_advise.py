@@ -21,8 +21,8 @@ from blast_env.design.search import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
-from blast_env.evaluation.consequences import Verdict
-from blast_env.evaluation.probability import LevelProbability
+from blast_env.evaluation.questions.probability import LevelProbability
+from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import LayoutState, load_layout
 from blast_env.plots import PricedDamage, cheapest

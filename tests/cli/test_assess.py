@@ -90,7 +90,7 @@ def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
     layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
     output = run(site, "--layout", layout)
     line = next(each for each in output.splitlines() if each.startswith("impulse on the protected"))
-    assert line.count("(cells)") == 3
+    assert line.count(" +- ") == 3
     likely = [each for each in output.splitlines() if each.startswith("probability, ")]
     assert [each.split(",")[1][:5] for each in likely] == [" 6 ba", " no b"]
     assert all("'low' with " in each for each in likely)

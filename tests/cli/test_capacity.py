@@ -7,12 +7,13 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
-from blast_env.evaluation import BlastEvaluator, capacity
-from blast_env.evaluation.consequences import Consequences
-from blast_env.evaluation.probability import scaled_to
-from blast_env.evaluation.shared import consequences
-from blast_env.geometry import Layout
-from blast_env.site import AnyCharge, Charge
+from blast_env.evaluation import LoadCaseSet
+from blast_env.evaluation.blasts import Blasts
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.questions import capacity
+from blast_env.evaluation.questions.probability import scaled_to
+from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.site import Charge
 from tests.gas_sites import WALL, glazed_hut
 
 
@@ -21,15 +22,20 @@ def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.Mon
     site = tmp_path / "glazed.toml"
     blast_env.save_scenario(glazed_hut(), site)
     layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
-    first: list[Consequences] = []
+    first: list[Blasts] = []
+    run = Campaign.run
 
-    def scaled(evaluator: BlastEvaluator, layout: Layout, charges: list[AnyCharge]) -> Consequences:
-        (charge,) = charges
+    def once(campaign: Campaign) -> LoadCaseSet:
+        first[:] = first or [run(campaign)]
+        return campaign.case
+
+    def scaled(case: LoadCaseSet) -> Consequences:
+        (charge,) = case.charges
         assert isinstance(charge, Charge)
-        first[1:] = first[:1] or [consequences(evaluator, layout, charges)]
-        return scaled_to(first[-1], charge)
+        return scaled_to(consequences_of(first[0]), charge)
 
-    monkeypatch.setattr(capacity, "consequences", scaled)
+    monkeypatch.setattr(Campaign, "run", once)
+    monkeypatch.setattr(capacity, "consequences_of", scaled)
     options = ("--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
     done = CliRunner().invoke(app, ["assess", "--capacity", *map(str, (site, *options))])
     assert done.exit_code == 0, done.output

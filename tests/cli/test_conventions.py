@@ -14,9 +14,10 @@ from typer.core import TyperGroup
 from typer.testing import CliRunner, Result
 
 from blast_env import save_scenario
+from blast_env.answers.document import Table
+from blast_env.answers.terminal import TableView
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
-from blast_env.cli.output import ResultTable
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
 from blast_env.gas import GasRun
 from blast_env.layout import LayoutFile
@@ -92,9 +93,9 @@ def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
 )
 def test_no_word_of_a_table_is_cut(headers: list[list[str]], width: int, text_columns: int) -> None:
     rows = [[" ".join(words[number:]) or "1,234.5" for words in headers] for number in range(3)]
-    table = ResultTable.of("title", [" ".join(words) for words in headers], rows, text_columns)
+    table = Table.of("title", [" ".join(words) for words in headers], rows, text_columns)
     console = Console(width=width, file=StringIO(), color_system=None)
-    console.print(table)
+    console.print(TableView(table))
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     assert max(len(line.rstrip()) for line in lines) <= width
     shown = {word for line in lines for word in line.split()}

@@ -18,7 +18,7 @@ from blast_env.curves import (
     oblique,
     reflected_pa,
 )
-from blast_env.evaluation.probability import load_factors
+from blast_env.evaluation.questions.probability import load_factors
 from blast_env.site.blast_site import Charge
 
 

@@ -21,6 +21,7 @@ from blast_env.evaluation import (
     evaluate_layout,
 )
 from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.record import BlastRecord
 from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.store import Store
 from tests.attack.disks import file_size_limit
@@ -131,7 +132,7 @@ def test_what_is_no_cache_is_refused(
         BlastStore("folder", most_bytes=-1)
 
 
-EMPTY = b'{"structures": [], "bays": []}\n'
+EMPTY = BlastRecord(BlastLoads((), np.zeros(0))).encoded()
 
 
 @pytest.mark.parametrize(

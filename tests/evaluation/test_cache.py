@@ -9,7 +9,8 @@ import pytest
 from blast_env import Charge
 from blast_env.evaluation import BlastEvaluator, BlastLoads
 from blast_env.evaluation.engines.particles import EventEngine
-from blast_env.evaluation.store import BlastKey, BlastStore
+from blast_env.evaluation.record import BlastKey
+from blast_env.evaluation.store import BlastStore
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
 

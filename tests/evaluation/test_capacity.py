@@ -4,14 +4,18 @@ from dataclasses import replace
 
 import pytest
 
-from blast_env.evaluation import BlastEvaluator, capacity
-from blast_env.evaluation.capacity import Edge, Ladder
-from blast_env.evaluation.consequences import Consequences
+from blast_env.answers import Table
+from blast_env.answers.assess import capacity_answer
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.probability import scaled_to
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions import capacity
+from blast_env.evaluation.questions.capacity import Edge, Ladder, PlaceCapacity
+from blast_env.evaluation.questions.probability import scaled_to
+from blast_env.evaluation.questions.verdict import Consequences
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge
+from tests.blasts import consequences
 from tests.gas_sites import glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 0.1)
@@ -24,11 +28,13 @@ def blast() -> Consequences:
 
 @pytest.fixture
 def ladder(blast: Consequences, monkeypatch: pytest.MonkeyPatch) -> Ladder:
-    def scaled(evaluator: BlastEvaluator, _layout: object, charges: list[Charge]) -> Consequences:
-        evaluator.scenario.with_charge(charges[0])
-        return scaled_to(blast, charges[0])
+    def scaled(campaign: Campaign) -> LoadCaseSet:
+        campaign.scenario.with_possible_charges(campaign.case.charges)
+        return campaign.case
 
-    monkeypatch.setattr(capacity, "consequences", scaled)
+    monkeypatch.setattr(Campaign, "run", scaled)
+    answer = lambda case: scaled_to(blast, case.charges[0])  # noqa: E731
+    monkeypatch.setattr(capacity, "consequences_of", answer)
     return Ladder(BlastEvaluator(glazed_hut(), GasEngine()), (), CHARGE)
 
 
@@ -54,7 +60,7 @@ def test_a_level_is_kept_up_to_the_edge(
 def test_the_stand_off_ends_at_the_border_of_the_site(ladder: Ladder) -> None:
     edge = ladder.edge(LevelOfProtection.HIGH, nearer=True)
     assert not edge.is_kept
-    assert edge.stand_off_text.startswith("> ")
+    assert edge.is_end
 
 
 def test_a_lower_level_bears_more(ladder: Ladder) -> None:
@@ -67,7 +73,14 @@ def test_a_lower_level_bears_more(ladder: Ladder) -> None:
 
 
 def test_the_end_of_the_ladder_is_a_bound() -> None:
-    assert Edge(CHARGE, 4.0, is_end=True).mass_text == ">= 0.1"
-    assert Edge(CHARGE, 4.0, is_kept=False, is_end=True).mass_text == "< 0.1"
-    assert Edge(CHARGE, 4.0, is_kept=False, is_end=True).stand_off_text == "> 4.0"
-    assert Edge(CHARGE, 4.0).stand_off_text == "4.0"
+    edges = (
+        Edge(CHARGE, 4.0, is_end=True),
+        Edge(CHARGE, 4.0, is_kept=False, is_end=True),
+        *(Edge(CHARGE, 4.0),) * 2,
+    )
+    place = PlaceCapacity("wall", CHARGE, 4.0, edges, edges, 3)
+    _, masses, stand_offs = capacity_answer(glazed_hut(), [place])
+    assert isinstance(masses, Table)
+    assert isinstance(stand_offs, Table)
+    assert masses.cells() == [("wall", "2.0, 4.0", "4.0 m", ">= 0.1", "< 0.1", "0.1", "0.1")]
+    assert stand_offs.cells() == [("wall", "2.0, 4.0", "0.1 kg", "<= 4.0", "> 4.0", "4.0", "4.0")]

@@ -3,12 +3,11 @@
 import pytest
 
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.consequences import Consequences, bay_table
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions.verdict import Consequences, bay_table
 from blast_env.evaluation.standing import NOT_KNOWN
-from blast_env.report.loads import measure, targets_of
 from blast_env.site import Charge
+from tests.blasts import consequences
 from tests.gas_sites import glazed_hut, hut
 
 CUT, WHOLE = GasEngine(border_m=0.0, until=0.012), GasEngine(border_m=0.0, until="walls")
@@ -36,10 +35,9 @@ def test_bays_that_are_cut_off_are_flagged() -> None:
 
 @pytest.mark.parametrize(("engine", "known"), [(CUT, False), (WHOLE, True)])
 def test_reports_flag_every_building(engine: GasEngine, known: bool) -> None:
-    scenario = hut()
-    measured = measure(GasBlast(scenario, engine=engine), targets_of(scenario))
-    assert measured.loads["hut"].known == known
-    assert (f"hut: {NOT_KNOWN}" in measured.notes) != known
+    details = GasBlast(hut(), engine=engine).recorded().record.complete
+    assert details.buildings["hut"].known == known
+    assert (f"hut: {NOT_KNOWN}" in details.notes) != known
 
 
 @pytest.mark.parametrize(("until", "late"), [(0.004, ["front", "behind"]), ("gauges", [])])

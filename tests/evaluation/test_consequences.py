@@ -8,16 +8,15 @@ import pytest
 
 from blast_env.calibration import kingery_bulmash
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.consequences import (
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.questions.verdict import (
     BuildingResponse,
     Consequences,
     bay_table,
     side_on_impulse_pa_s,
     side_on_peak_pa,
 )
-from blast_env.evaluation.engines import simulate
-from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.response import (
     BuildingDamage,
@@ -27,6 +26,7 @@ from blast_env.response import (
     respond,
 )
 from blast_env.site import Charge, Scenario
+from tests.blasts import consequences
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 
 FACADE = {"storey_m": 2.5, "bay_m": 1.5, "glazing": "window_laminated_6", "wall": "concrete_200"}
@@ -119,7 +119,7 @@ def test_pieces_that_fall_in_time_are_taken_away(found: Consequences) -> None:
     """A wall of 500 kg is on its way when the blast is over; lighter ones do not count."""
     (barrier,) = judge(site(mass_kg=500.0), WALL, without_fallen=True).barriers
     assert barrier.taken_away == ()
-    assert list(barrier.pieces["outcome"][:1]) == ["overturns"]
+    assert "overturns" in list(barrier.pieces["outcome"])
     gone = judge(site(mass_kg=60.0, friction=2.0), WALL, without_fallen=True)
     (barrier,) = gone.barriers
     assert barrier.taken_away == WALL[:2]

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from blast_env.evaluation.consequences import BuildingResponse, Severity
+from blast_env.evaluation.blasts import Severity
+from blast_env.evaluation.questions.verdict import BuildingResponse
 from blast_env.response import respond
 from blast_env.site import Charge
 from tests.gas_sites import glazed_hut

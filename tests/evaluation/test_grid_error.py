@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from blast_env.answers.document import TYPOGRAPHIC, Number, percent, worse
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, evaluate_layout
-from blast_env.evaluation.answers import percent, points, with_errors, worse
 from blast_env.evaluation.cases import LoadCaseSet, draw_threats
 from blast_env.evaluation.engines import final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.grid_error import convergence_index
+from blast_env.evaluation.questions.grid_error import convergence_index
 from blast_env.site import load_scenario
-from blast_env.statistics import reductions
+from blast_env.statistics import Estimate, reductions
 from tests.gas_sites import WALL, hut, site_document
 
 NUMBERS = st.floats(-1e6, 1e6)
@@ -79,10 +79,15 @@ def test_the_coarser_cells_are_twice_as_large(engine: GasEngine, coarser: GasEng
 
 
 def test_words() -> None:
-    assert with_errors("48.5 %", points(0.0141), "2.1 (95 %, charges)") == (
+    share = Number.share(0.485, 0.0141)
+    assert share.text() == "48.5 % +- 1.4"
+    assert share.sampled_by(Estimate(0.485, 0.464, 0.506), "charges", 0.01).text() == (
         "48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)"
     )
-    assert with_errors("48.5 %", points(float("nan"))) == "48.5 %"
+    assert Number.share(0.485).text() == "48.5 %"
+    assert Number(1234.56, "Pa s", 12.34).text() == "1,235 Pa s +- 12"
+    assert Number(-0.01234, error=0.00056).text(TYPOGRAPHIC) == "\N{MINUS SIGN}0.0123 ± 0.00056"
+    assert [Number(each).text() for each in (0.0, 99.96, float("nan"))] == ["0", "100.0", "-"]
     assert [percent(each) for each in (-4e-4, -6e-4, float("nan"))] == ["0.0 %", "-0.1 %", "-"]
 
 
@@ -127,7 +132,8 @@ def test_several_cases_have_that_of_the_worst_charge() -> None:
     cases = [LoadCaseSet(each, draw_threats(each, [0])) for each in (light, hut())]
     found = compare(evaluators, cases, [WALL, WALL], with_error=True)
     assert found.grid_error is not None
-    assert found.grid_error.case is cases[1]
+    assert found.every[1].coarse is not None
+    assert found.every[0].coarse is None
     assert evaluators.counts.blasts == 2 * 2 + 2
     assert 0.0 < found.reduction_error < 0.05
     assert 0.0 < found.mean_error < 0.1 * found.mean.value

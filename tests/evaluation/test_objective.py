@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.cli.evaluate import print_means
+from blast_env.answers.document import Number
+from blast_env.answers.evaluate import means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
@@ -15,6 +16,7 @@ from blast_env.evaluation import (
     LoadCaseSet,
     draw_threats,
 )
+from blast_env.evaluation.questions.grid_error import impulse_of
 from blast_env.site import (
     Charge,
     ConditionalValueAtRisk,
@@ -106,8 +108,10 @@ def test_several_charges_become_one_as_the_objective_says(
 def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     evaluator = BlastEvaluator(site(charges="worst"), "gas")
     evaluation = evaluate_against(evaluator, WALL, [NEAR, FAR])
-    loads = [each.protected_impulse_pa_s for each in evaluation.blasts[0]]
-    unprotected = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts[0]]
+    blasts = evaluation.blasts
+    loads, unprotected = (
+        blasts.values(name, impulse_of) for name in (blasts.judged, blasts.unprotected)
+    )
     assert evaluation.load == max(loads)
     assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(unprotected))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
@@ -150,13 +154,11 @@ def test_wrong_objectives_are_named_all_at_once() -> None:
         site(quantity="impulse", reference_peak_pa=3.0)
 
 
-def test_totals_are_printed_with_the_unit_of_what_counts(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_totals_are_printed_with_the_unit_of_what_counts() -> None:
     evaluator = BlastEvaluator(site(quantity="peak"), "gas")
     evaluation = evaluate_against(evaluator, WALL, draw_threats(evaluator.scenario, [0]))
-    print_means(evaluation, evaluator.scenario.objective)
-    printed = capsys.readouterr().out
+    lines = means(evaluation, evaluator.scenario.objective)
+    printed = "\n".join(each.text() for each in lines)
     assert f"without barrier: mean {evaluation.unprotected_load:,.0f} Pa," in printed
     assert "psi s" not in printed
 
@@ -167,20 +169,22 @@ class Cracking(ObjectiveSection):
     def load(self, impulse_pa_s: float, *others: Any, **more: Any) -> float:
         return super().load(max(impulse_pa_s - 100.0, 0.0), *others, **more)
 
-    def text(self, load: float) -> str:
-        return f"{load:.0f} Pa s of cracking"
+    @property
+    def unit(self) -> str:
+        return "Pa s of cracking"
 
 
 def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
-    measured: tuple[dict[str, float], dict[str, float]], capsys: pytest.CaptureFixture[str]
+    measured: tuple[dict[str, float], dict[str, float]],
 ) -> None:
     own = hut().model_copy(update={"objective": Cracking()})
     unprotected, protected = (each["impulse"] - 100.0 for each in measured)
     assert protected > 0.0
     evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
     assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((unprotected, protected))
-    print_means(evaluation, own.objective)
-    assert f"with barrier: mean {protected:.0f} Pa s of cracking" in capsys.readouterr().out
+    *_, last = means(evaluation, own.objective)
+    expected = Number(protected, "Pa s of cracking").text()
+    assert last.text().startswith(f"with barrier: mean {expected}")
     env = BlastBarrierEnv(scenario=own, engine="gas")
     env.reset(seed=0, options={"charge_position_m": (2.0, 4.0), "layout": WALL})
     _, _, _, _, info = env.step(env.placement.catalogue.finish)

@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.app.records import BlastedLayout, BlastRecord, comparison
+from blast_env.answers.compare import comparison
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
+from blast_env.evaluation.blasts import Blasts
+from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.record import BlastRecord
 from blast_env.gas import stepped_buildings
-from blast_env.report.loads import measure, targets_of
+from blast_env.geometry import Layout
 from blast_env.site import Charge, Scenario
 from tests.app.here import rows_of
 from tests.gas_sites import site_document
@@ -90,22 +93,15 @@ def test_evaluation_and_benchmark(hall: Scenario, load_pa_s: float) -> None:
 
 
 def test_the_report(hall: Scenario, load_pa_s: float) -> None:
-    measured = measure(GasBlast(hall, engine=ENGINE, charge=CHARGE), targets_of(hall))
-    assert measured.loads["hall"].impulse_pa_s == pytest.approx(load_pa_s)
+    record = GasBlast(hall, engine=ENGINE, charge=CHARGE).recorded().record
+    assert record.complete.buildings["hall"].impulse_pa_s == pytest.approx(load_pa_s)
 
 
 def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
-    record = BlastRecord(
-        key="",
-        threat="T1",
-        cells=0.5,
-        layout=(),
-        loads=result.structure_loads,
-        unchecked=(),
-        seconds=0.0,
-        repeat={},
-    )
-    table = comparison([BlastedLayout("no barrier", 0.0, {"T1": record})], ["T1"], hall)
+    record, threat = BlastRecord(result.loads()), LoadCase(CHARGE, name="T1")
+    layouts: dict[str, Layout] = {"no barrier": ()}
+    blasts = Blasts(LoadCaseSet(hall, (threat,)), layouts, {"no barrier": (record,)}, ENGINE)
+    table = comparison({"no barrier": (blasts, 0.0)}, ["T1"], hall)
     together, building = rows_of(table)
     assert building.structure == "hall"
     for row in (together, building):

@@ -7,18 +7,18 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.probability import (
+from blast_env.evaluation.questions.probability import (
     LevelProbability,
     Uncertainty,
     level_probability,
     probability_text,
     scaled_to,
 )
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions.verdict import Consequences
 from blast_env.response import LevelOfProtection, impulses
 from blast_env.site import Charge
+from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 0.1)

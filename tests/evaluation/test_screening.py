@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.screening import Screening, screen, stand_offs
+from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
 from blast_env.response import (
     Bay,
     FilledBay,

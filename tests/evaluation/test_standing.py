@@ -3,12 +3,12 @@
 import pytest
 
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
-from blast_env.evaluation.consequences import bay_table
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions.verdict import bay_table
 from blast_env.evaluation.standing import LoadStanding, standing_of
 from blast_env.geometry import Layout
 from blast_env.site import Charge
+from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.shared import consequences
 from blast_env.gas import STEPPED, stepped_buildings
 from blast_env.site import WALLS, Scenario, bundled_scenarios, load_scenario
 from studies.gas.oblique import turned_block
+from tests.blasts import consequences
 from tests.gas_sites import site_document
 from tests.office_park import office_park
 

@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.evaluation.questions.verdict import BuildingResponse
 from blast_env.plots import (
     LEVEL_COLOURS,
     facade_picture,

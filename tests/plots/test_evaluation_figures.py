@@ -8,6 +8,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
+from blast_env.answers.evaluate import evaluation_title
 from blast_env.evaluation import Evaluation, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.plots import evaluation_figure, save_figure
@@ -32,7 +33,7 @@ def evaluation() -> Evaluation:
 
 @pytest.fixture(scope="module")
 def figure(evaluation: Evaluation) -> Figure:
-    return evaluation_figure(evaluation)
+    return evaluation_figure(evaluation, evaluation_title(evaluation))
 
 
 def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
@@ -81,8 +82,8 @@ def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
     figure: Figure, evaluation: Evaluation
 ) -> None:
     title = figure.get_suptitle()
-    low, high = (f"{100.0 * end:.0f} %" for end in evaluation.ci95)
-    share = f"{100.0 * evaluation.mean_reduction:.0f} %"
+    low, high = (f"{100.0 * end:.1f} %" for end in evaluation.ci95)
+    share = f"{100.0 * evaluation.mean_reduction:.1f} %"
     assert f"reduction of the impulse {share} (95 %: {low} to {high})" in title
     assert any("outside the validated range" in text.get_text() for text in figure.axes[0].texts)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -98,8 +99,8 @@ def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> Non
     evaluation = evaluate_layout(
         load_scenario("courtyard"), [], engine="event", threats=THREATS[:1]
     )
-    figure = evaluation_figure(evaluation)
-    assert "no barrier: reduction of the impulse 0 %" in figure.get_suptitle()
+    figure = evaluation_figure(evaluation, evaluation_title(evaluation))
+    assert "no barrier: reduction of the impulse 0.0 %" in figure.get_suptitle()
     assert "95 %" not in figure.get_suptitle()
     path = save_figure(figure, tmp_path / "empty.png")
     assert path.stat().st_size > 10_000
@@ -115,7 +116,7 @@ def test_the_parts_of_a_building_have_one_load() -> None:
     scenario = Scenario.from_document(document, "halves")
     engine = GasEngine(border_m=0.0, until=0.01)
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
-    figure = evaluation_figure(found)
+    figure = evaluation_figure(found, evaluation_title(found))
     assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
     words = [each.get_text() for axes in figure.axes for each in axes.texts]
     assert not any("calibration" in each for each in words)

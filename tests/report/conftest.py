@@ -5,7 +5,7 @@ from functools import cache, partial
 
 import pytest
 
-from blast_env.evaluation.probability import level_probability
+from blast_env.evaluation.questions.probability import level_probability
 from blast_env.report import Limit, Study, StudyOptions, page, run_study
 from tests.figures import undrawn_package as undrawn_package
 from tests.report.sites import LAYOUT, glazed_hut

@@ -8,15 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import LoadCase
-from blast_env.evaluation.consequences import Severity
+from blast_env.evaluation import LoadCase, ThreatOutcome
+from blast_env.evaluation.blasts import Severity
 from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.evaluation.engines.peaks import PeakSource
+from blast_env.evaluation.engines.walls import first_phase_s
+from blast_env.evaluation.record import BuildingLoad
 from blast_env.evaluation.standing import UNSTATED
 from blast_env.report import Limit, StudyOptions
-from blast_env.report.loads import TargetLoad, first_phase_s, targets_of
-from blast_env.report.outcomes import check_limits
-from blast_env.report.peaks import CountedPeak, PeakSource
-from blast_env.report.study import Runs
+from blast_env.report.limits import check_limits
+from blast_env.report.study import Runs, targets_of
 from blast_env.report.threats import (
     chief_threats,
     other_places,
@@ -97,10 +98,9 @@ def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
 
 def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
     site = gate_site()
-    runs = Runs(site, POSTS, StudyOptions(), targets_of(site), (), lambda _, __: None)
-    (outcome,) = runs.other_places()[:1]
-    runs.choose_threats()
-    assert [each.name for each in runs.threats] == ["T1"]
+    runs = Runs(site, POSTS, StudyOptions(), lambda _, __: None)
+    outcome = ThreatOutcome.of(runs.other_places(), 0)
+    assert [each.name for each in runs.choose_threats()] == ["T1"]
     near, far = (
         GasBlast(site, layout, charge=Charge((x_m, 4.0), 5.0)).run().impulse("hut").pa_s
         for layout, x_m in (((), 9.0), (POSTS, 3.0))
@@ -124,7 +124,8 @@ def test_structures_of_a_building_are_one_target() -> None:
         hut | {"name": "hut_b", "corner_m": [6.0, 5.0], "rows": 2, "building": "hut"},
     ]
     first, second = targets_of(Scenario.from_document(document, "hut"))
-    assert (first.name, first.names, first.protected) == ("hut", ("hut_a", "hut_b"), True)
+    assert (first.name, first.protected) == ("hut", True)
+    assert [each.name for each in first.structures] == ["hut_a", "hut_b"]
     assert first.bounds_m == (6.0, 3.0, 8.0, 6.0)
     assert first.height_m == 2.0
     assert (second.name, second.protected) == ("shed", False)
@@ -133,10 +134,10 @@ def test_structures_of_a_building_are_one_target() -> None:
 # Limits.
 
 
-def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
-    counted = CountedPeak(peak_pa, PeakSource.CURVE)
-    return TargetLoad(
-        1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False, UNSTATED
+def load(impulse_pa_s: float, peak_pa: float) -> BuildingLoad:
+    counted = peak_pa, PeakSource.CURVE.value
+    return BuildingLoad(
+        *(1.0, 0.5 * peak_pa, *counted, 0.1, "west", impulse_pa_s, 0.1, True, False, UNSTATED)
     )
 
 
@@ -158,7 +159,7 @@ def test_limit_that_is_none_is_named(text: str) -> None:
 
 
 def test_limits_are_of_buildings_that_exist() -> None:
-    targets = targets_of(small_hut())
+    targets = [each.name for each in targets_of(small_hut())]
     with pytest.raises(UnknownNameError, match="no building 'hat', did you mean 'hut'"):
         check_limits([Limit("hat", 1.0)], targets)
     with pytest.raises(BlastEnvError, match="twice for 'hut'"):

@@ -4,11 +4,11 @@ import pandas as pd
 import pytest
 
 from blast_env.calibration import kingery_bulmash
+from blast_env.evaluation.engines.peaks import CountedPeak, PeakSource, counted_peak
 from blast_env.geometry import Layout
 from blast_env.layout import build_site
-from blast_env.report.outcomes import Limit
+from blast_env.report.limits import Limit
 from blast_env.report.page import report_html
-from blast_env.report.peaks import CountedPeak, PeakSource, counted_peak
 from blast_env.report.study import Study
 from blast_env.report.verdict import StudyVerdict
 from blast_env.response import peak_factor
@@ -45,9 +45,9 @@ def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(
 def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:
     pair = study.fine[0]
     unprotected = pair.unprotected
-    assert unprotected.counted.source is PeakSource.CURVE
-    limit = Limit("hut", peak_pa=0.5 * (unprotected.peak_pa + unprotected.counted.pa))
-    assert unprotected.peak_pa < limit.peak_pa < unprotected.counted.pa
+    assert unprotected.counted_by == PeakSource.CURVE
+    limit = Limit("hut", peak_pa=0.5 * (unprotected.peak_pa + unprotected.counted_pa))
+    assert unprotected.peak_pa < limit.peak_pa < unprotected.counted_pa
     assert not limit.is_kept(unprotected)
     words = f"(Kingery-Bulmash reflected; gas {unprotected.peak_pa / 1e3:.0f})"
     assert words in report_html(study, ["blast-env"])

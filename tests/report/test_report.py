@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,24 +15,25 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, StructureLoad
-from blast_env.evaluation.consequences import Consequences
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.grid_error import convergence_index
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, LoadCaseSet, StructureLoad
+from blast_env.evaluation.blasts import NO_BARRIER, Blasts
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult, RecordedBlast
+from blast_env.evaluation.questions.grid_error import convergence_index
+from blast_env.evaluation.questions.verdict import consequences_of
+from blast_env.evaluation.record import BlastRecord
 from blast_env.gas import Cells
 from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.io.export import LayoutPlan, bill_of_quantities
 from blast_env.layout import write_layout
 from blast_env.report import Limit, Study, StudyOptions, run_study, write_report
 from blast_env.report.details import ReportDetails, read_details
-from blast_env.report.loads import MeasuredBlast, measure, targets_of
 from blast_env.report.page import report_html
 from blast_env.report.study import Runs, blasts_of
 from blast_env.report.threats import other_places
 from blast_env.report.verdict import StudyVerdict
 from blast_env.response import LevelOfProtection, catalogue
 from blast_env.site import Charge, Hardening, Scenario, save_scenario
+from tests.blasts import blasts_behind
 from tests.catalogue_sites import WALL, yard
 from tests.report.sites import LAYOUT, glazed_hut, small_hut
 from tests.site.test_hardening import TAKEN, glazed_yard
@@ -47,14 +48,37 @@ def page(study: Study) -> str:
 def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Spare a study its pictures, which take as long as its blasts."""
     for name in ("blast_pictures", "damage_pictures"):
-        monkeypatch.setattr(f"blast_env.report.study.{name}", lambda *_: ())
-    monkeypatch.setattr("blast_env.report.study.risk_picture", lambda *_: ("risk", b""))
+        monkeypatch.setattr(f"blast_env.report.figures.{name}", lambda *_: ())
+    monkeypatch.setattr("blast_env.report.figures.risk_picture", lambda *_: ("risk", b""))
 
 
 @pytest.fixture(scope="module")
-def measured() -> MeasuredBlast:
-    scenario = small_hut()
-    return measure(GasBlast(scenario, LAYOUT), targets_of(scenario))
+def measured() -> RecordedBlast:
+    return GasBlast(small_hut(), LAYOUT).recorded()
+
+
+def changed(study: Study, change: Callable[[str, float, BlastRecord], BlastRecord]) -> Study:
+    """Return a study with other records, by the name of the layout and the side of the cells."""
+
+    def of(blasts: Blasts) -> Blasts:
+        records = {
+            name: tuple(change(name, blasts.engine.smallest_m, each) for each in own)
+            for name, own in blasts.records.items()
+        }
+        coarse = None if blasts.coarse is None else of(blasts.coarse)
+        return replace(blasts, records=records, coarse=coarse)
+
+    return replace(study, blasts=of(study.blasts))
+
+
+def with_notes(study: Study, notes: Mapping[float, tuple[str, ...]]) -> Study:
+    """Return a study with other notes on the blasts with the layout, by the side of the cells."""
+
+    def change(name: str, cell_m: float, record: BlastRecord) -> BlastRecord:
+        own = () if name == NO_BARRIER else notes.get(cell_m, ())
+        return replace(record, details=replace(record.complete, notes=own))
+
+    return changed(study, change)
 
 
 def test_names_and_changes_of_the_map_are_in_the_report(study: Study) -> None:
@@ -70,7 +94,7 @@ def test_names_and_changes_of_the_map_are_in_the_report(study: Study) -> None:
     assert "<li>left out: open lines: 1 (LINE 3F on the layer A)</li>" in page
 
 
-def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> None:
+def test_loads_are_those_of_the_blast(study: Study, measured: RecordedBlast) -> None:
     (threat,), (target,) = study.threats, study.targets
     result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")
     (row,) = result.structures.to_dict("records")
@@ -81,7 +105,7 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     assert pair.protected.arrival_s == row["arrival_s"]
     assert pair.protected.wall == row["most_loaded_face"]
     assert pair.protected.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
-    assert pair.protected == measured.loads["hut"]
+    assert pair.protected == measured.record.complete.buildings["hut"]
     assert 0.1 < pair.reduction < 0.5
     assert {each.cells for each in study.pairs} == {0.5, 0.25}
     (fine,) = study.fine
@@ -94,7 +118,7 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
 
 
-def test_histories_are_the_momentum_of_the_walls(measured: MeasuredBlast) -> None:
+def test_histories_are_the_momentum_of_the_walls(measured: RecordedBlast) -> None:
     """Mean overpressure over time is the running impulse at the end."""
     faces = measured.result.faces
     for wall in ("west", "north"):
@@ -115,11 +139,11 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
         for layout in ((), LAYOUT, LAYOUT[1:])
     ]
     unprotected, whole, without = impulses
-    worths = {each.name: each.worth for each in study.items}
+    worths = {each.name: each.worth for each in study.worths}
     first, second, third, last = (layout_text([each]) for each in LAYOUT)
     assert worths.keys() == {first, second, third, last}
     assert worths[first] == pytest.approx((without - whole) / unprotected)
-    assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
+    assert [each.worth for each in study.worths] == sorted(worths.values(), reverse=True)
     # The charge is in the middle before the wall: both halves are worth alike, but for rounding.
     assert worths[first] == pytest.approx(worths[last], rel=0.05)
     assert worths[second] == pytest.approx(worths[third], rel=0.05)
@@ -127,48 +151,42 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
 
 
 def test_places_are_those_of_the_scenario(study: Study) -> None:
-    (place,) = study.places
+    (place,) = study.outcomes
     pair = next(each for each in study.pairs if each.cells == 0.5)
     assert place.load == pytest.approx(pair.protected.impulse_pa_s)
     assert place.reduction == pytest.approx(pair.reduction)
 
 
-def test_impulses_stay_impulses_where_damage_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impulses_stay_impulses_where_damage_counts() -> None:
     """The page gives them in Pa s: not the shortfall of a level that an objective counts."""
     scenario = glazed_yard(target="medium")
-    own = {each.name: each for each in scenario.structures}
     bare, walled = (
-        BlastLoads(tuple(StructureLoad.on(each, pa_s) for each in own.values()), np.zeros(0))
+        BlastLoads(tuple(StructureLoad.on(each, pa_s) for each in scenario.structures), np.zeros(0))
         for pa_s in (200.0, 150.0)
     )
-    threat = LoadCase(Charge((2.0, 6.0), 1.0), name="T1")
-    runs = Runs(
-        scenario, (TAKEN,), StudyOptions(), targets_of(scenario), (threat,), lambda *_: None
-    )
-
-    def blasts(_: str, layouts: Sequence[Layout], cases: Sequence[LoadCase]) -> list[BlastLoads]:
-        return [walled if layout else bare for layout in layouts for _ in cases]
-
-    monkeypatch.setattr(runs, "_blasts", blasts)
-    for each in runs.other_places():
-        assert (each.unprotected_load, each.load) == (200.0, 150.0)
-        assert each.reduction == pytest.approx(0.25)
+    case = LoadCaseSet(scenario, (LoadCase(Charge((2.0, 6.0), 1.0), name="T1"),))
+    layouts: dict[str, Layout] = {NO_BARRIER: (), "layout": (TAKEN,)}
+    records = {NO_BARRIER: (BlastRecord(bare),), "layout": (BlastRecord(walled),)}
+    blasts = Blasts(case, layouts, records, GasEngine())
+    (each,) = Study(scenario, (TAKEN,), StudyOptions(), blasts, places=blasts).outcomes
+    assert (each.unprotected_load, each.load) == (200.0, 150.0)
+    assert each.reduction == pytest.approx(0.25)
 
 
 def test_page_one_counts_the_notes_on_the_cells_that_decide(study: Study) -> None:
-    fine, coarse = (f"T1 with the layout, cells of {m} m: far" for m in ("0.25", "0.5"))
-    of_both = report_html(replace(study, notes=(coarse, fine)), [])
+    of_both = report_html(with_notes(study, {0.25: ("far",), 0.5: ("far",)}), [])
     assert "1 note on loads outside the validated range" in of_both
     assert "2 notes, under validity; 1 with the finer cells, which decide" in of_both
-    of_one = report_html(replace(study, notes=(coarse,)), [])
+    of_one = report_html(with_notes(study, {0.5: ("far",)}), [])
     assert "on loads outside the validated range of the engine" not in of_one
 
 
 def test_pieces_of_a_catalogue_are_the_items() -> None:
     """Ranked one by one, each left out whole."""
     scenario, threats = yard(), other_places(yard(), 1)[:1]
-    runs = Runs(scenario, WALL, StudyOptions(), targets_of(scenario), threats, lambda _, __: None)
-    worths = {each.name: each for each in runs.item_worths()}
+    items = Runs(scenario, WALL, StudyOptions(), lambda _, __: None).without_items(threats)
+    study = Study(scenario, WALL, StudyOptions(), items, items=items)
+    worths = {each.name: each for each in study.worths}
     assert worths.keys() == {"5,1,wall,turned", "8,1,wall,turned", "4,1,post"}
     assert worths["5,1,wall,turned"].rectangle_m == (4.0, 5.0, 4.5, 6.5)
     assert worths["5,1,wall,turned"].worth > worths["4,1,post"].worth
@@ -228,9 +246,9 @@ def test_loads_within_what_was_checked(study: Study, page: str) -> None:
     """What is outside is said by name; here a copy of the study without notes."""
     assert any("checked from 9.2" in note for note in study.notes)
     assert "outside the validated range of the engine" in page
-    changed = report_html(replace(study, notes=()), ["blast-env"])
-    assert f"<td>{study.fine[0].unprotected.peak_pa / 1e3:.0f}</td>" in changed
-    assert "No load in this report is outside that range." in changed
+    silent = report_html(with_notes(study, {}), ["blast-env"])
+    assert f"<td>{study.fine[0].unprotected.peak_pa / 1e3:.0f}</td>" in silent
+    assert "No load in this report is outside that range." in silent
 
 
 def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Path) -> None:
@@ -349,14 +367,14 @@ def test_details_come_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_barrier_that_adds_load_is_named(study: Study) -> None:
-    pairs = tuple(
-        replace(
-            each,
-            unprotected=replace(each.unprotected, impulse_pa_s=0.9 * each.protected.impulse_pa_s),
-        )
-        for each in study.pairs
-    )
-    page = report_html(replace(study, pairs=pairs), [])
+    protected = study.fine[0].protected
+
+    def change(name: str, _: float, record: BlastRecord) -> BlastRecord:
+        share = 0.9 if name == NO_BARRIER else 1.0
+        load = replace(protected, impulse_pa_s=share * protected.impulse_pa_s)
+        return replace(record, details=replace(record.complete, buildings={"hut": load}))
+
+    page = report_html(changed(study, change), [])
     assert "\N{MINUS SIGN}11.1 % (the barrier makes it worse)" in page
 
 
@@ -368,13 +386,11 @@ def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
 
 
 def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) -> None:
-    empty = Consequences(())
-    options = replace(study.options, limits=())
-    unprotected = replace(
-        study, unprotected=empty, protected=empty, walled_coarse=empty, options=options
-    )
-    assert StudyVerdict(unprotected).word == "NO VERDICT"
-    page = report_html(unprotected, ["blast-env"])
+    none = np.zeros((0, 0))
+    plain = changed(study, lambda *each: replace(each[2], bays=(), pressure_pa=none))
+    plain = replace(plain, options=replace(study.options, limits=()))
+    assert StudyVerdict(plain).word == "NO VERDICT"
+    page = report_html(plain, ["blast-env"])
     assert "no building has a facade" in page
     assert "Loads of the protected buildings" in page
 
@@ -390,10 +406,10 @@ def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) 
 def test_a_report_that_is_stopped_has_what_was_done(
     cells: tuple[Cells, Cells], words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stop(_: Runs) -> None:
+    def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Runs, "item_worths", stop)
+    monkeypatch.setattr(Runs, "without_items", stop)
     stopped = run_study(small_hut(), LAYOUT, StudyOptions(cells=cells))
     assert stopped.stopped == "without each item"
     assert {each.cells for each in stopped.pairs} == {*cells}
@@ -413,13 +429,15 @@ def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
 ) -> None:
     sizes: list[float] = []
 
-    def measured(blast: GasBlast, *rest: object) -> MeasuredBlast:
-        sizes.append(blast.engine.cell_m)
+    record = GasEngine.record
+
+    def recorded(engine: GasEngine, *rest: Any) -> BlastRecord:
+        sizes.append(engine.cell_m)
         if len(sizes) == 4:
             raise KeyboardInterrupt
-        return measure(blast, *rest)  # type: ignore[arg-type]
+        return record(engine, *rest)
 
-    monkeypatch.setattr("blast_env.report.study.measure", measured)
+    monkeypatch.setattr(GasEngine, "record", recorded)
     stopped = run_study(glazed_hut(), LAYOUT, StudyOptions())
     assert sizes == [0.5, 0.5, 0.25, 0.25]
     assert stopped.stopped == "cells of 0.25 m"
@@ -456,9 +474,12 @@ def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(
     assert price(west, others, taken=(Measure.named("w"),)) == 20.0
 
 
-def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
+def test_measures_are_in_the_bill_without_sizes(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bill = bill_of_quantities(LayoutPlan(glazed_yard(), (TAKEN,)))
-    page = report_html(replace(study, bill=bill), ["blast-env"])
+    monkeypatch.setattr(Study, "bill", bill)
+    page = report_html(study, ["blast-env"])
     row = re.search(r"<tr><td class=\"l\">glass</td>.*</tr>", page)
     assert row is not None
     assert row[0].count("<td></td>") == 3
@@ -505,5 +526,6 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     fine = BlastEvaluator(small_hut(), GasEngine.with_cells(options.cells[1]), cache=tmp_path)
     fine.loads_of_many([((), threat), (LAYOUT, threat)])
     assert fine.counts.blasts == 0  # an evaluation after the report has them too
-    monkeypatch.setattr("blast_env.evaluation.shared._blasted", None)
-    assert consequences(fine, LAYOUT, [threat.charge]).barriers  # and so has `assess`
+    monkeypatch.setattr(GasEngine, "record", None)
+    found = blasts_behind(fine, LAYOUT, [threat.charge])  # and so has `assess`
+    assert consequences_of(found).barriers

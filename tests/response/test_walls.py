@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.screening import stand_offs
+from blast_env.evaluation.questions.screening import stand_offs
 from blast_env.response import (
     CONCRETE_LIMITS,
     DamageLevel,

@@ -8,7 +8,9 @@ import pytest
 
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, SeedRange
+from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.record import BlastRecord
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutState
 from blast_env.site import Charge, Scenario, save_scenario
@@ -88,10 +90,14 @@ def comparison_of(
     cases = tuple(LoadCaseSet(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
 
     def of(loads: list[float]) -> Evaluation:
-        count, engine = len(agent), find_engine("gas")
-        blasts = tuple((loads_of(SITE, each),) for each in loads)
-        bare = ((loads_of(SITE, 10.0),),) * count
-        return Evaluation(cases, ((),) * count, blasts, bare, engine)
+        layouts, engine = {"none": (), "layout": ()}, find_engine("gas")
+
+        def blasts(case: LoadCaseSet, load: float) -> Blasts:
+            sides = zip(layouts, (10.0, load), strict=True)
+            records = {name: (BlastRecord(loads_of(SITE, pa_s)),) for name, pa_s in sides}
+            return Blasts(case, layouts, records, engine)
+
+        return Evaluation(tuple(map(blasts, cases, loads)))
 
     rules = {"wall near the charge": rule or random, "wall near the building": other or random}
     methods = {NOTHING: [10.0] * len(agent), RANDOM: random, **rules, AGENT: agent}

@@ -10,12 +10,12 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import find_engine
-from blast_env.evaluation.shared import consequences
 from blast_env.layout import LayoutState, load_layout
 from blast_env.response import DamageLevel, plate_curve
 from blast_env.site import load_scenario
 from studies.plates import POISSON_RATIO, Plate, curve_values
 from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
+from tests.blasts import consequences
 
 FOUND = Path(__file__).parents[2] / "docs" / "data" / "best_found"
 SITES = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")

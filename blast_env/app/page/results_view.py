@@ -6,10 +6,13 @@ from typing import Any, Final
 
 from nicegui import background_tasks, run, ui
 
-from blast_env.app.page.tables import address_of, cells, columns_of, text_table
-from blast_env.app.records import TOGETHER, BlastRecord
-from blast_env.app.session import BARE, Session, ShownLayout
+from blast_env.answers.compare import headline, verdict_table
+from blast_env.answers.document import TYPOGRAPHIC
+from blast_env.answers.page import address_of, fill, text_table
+from blast_env.app.session import Session, ShownLayout
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.blasts import NO_BARRIER, Blasts
+from blast_env.evaluation.questions.grid_error import GridError
 
 _FILM: Final = "film"
 _NOTHING: Final = "No results yet for the current layouts: press Blast."
@@ -29,13 +32,15 @@ class _Found:
 
     Attributes:
         shown: The layout.
-        record: Its record.
+        blasts: Its blasts and those without a barrier.
+        number: Number of the threat in them.
         pictures: Addresses of its pictures, by their labels.
         damage: Names of the buildings whose damage can be drawn, by the labels of these pictures.
     """
 
     shown: ShownLayout
-    record: BlastRecord
+    blasts: Blasts
+    number: int
     pictures: Mapping[str, str]
     damage: Mapping[str, str]
 
@@ -54,7 +59,6 @@ class ResultsView:
         self._with_bare = True
         self._large = False
         self._state: object = None
-        self._loads: dict[tuple[str, ...], str] = {}
         self._build()
 
     def _build(self) -> None:
@@ -105,45 +109,41 @@ class ResultsView:
         shown = session.shown(threat)
         running = session.is_at_work
         options = (self._what, self._threat, self._with_bare, self._large, running)
-        blasts = session.folder.blasts_there(), session.folder.coarse_there()
-        state = (options, session.cells, shown, tuple(threats), blasts, session.scenario)
+        there = session.folder.blasts_there()
+        state = (options, session.cells, shown, tuple(threats), there, session.scenario)
         if state == self._state:
             return
         self._state = state
-        found = [*self._found(shown, threat)]
-        compared, verdicts = session.comparison(), session.verdicts()
-        at = next((k for k, each in enumerate(compared.headers) if "counts" in each), None)
-        self._loads = {
-            row[:2]: f"{row[3]} Pa s" if at is None else row[at]
-            for row in compared.rows
-            if row[2] == TOGETHER
-        }
+        results, judged = session.results(), session.verdicts()
+        found = [*self._found(shown, threat, results)]
         self._offer(found)
-        chosen = [each for each in found if self._with_bare or each.shown.name != BARE]
+        chosen = [each for each in found if self._with_bare or each.shown.name != NO_BARRIER]
         self._show_cards(chosen, threat)
-        self._sharp.visible = any("on the cells" in row[3] for row in verdicts.rows)
-        self._unglazed.visible = bool(found) and not verdicts.rows
-        for element, table, after in ((self._verdicts, verdicts, 0), (self._table, compared, 2)):
-            element.columns = columns_of(table.headers, table.text_columns, after)
-            element.rows = cells(table.rows)
-            element.visible = bool(table.rows)
-        self._errors.visible = any("\N{PLUS-MINUS SIGN}" in row[3] for row in compared.rows)
+        self._sharp.visible = any(each.is_clipped for *_, own in judged for each in own)
+        self._unglazed.visible = bool(found) and not judged
+        fill(self._verdicts, verdict_table(session.scenario, judged))
+        fill(self._table, session.comparison())
+        errors = (GridError.of(each) for each in results.values())
+        self._errors.visible = any(each is not None for each in errors)
         self._empty.visible = not found
         self._empty.text = _RUNNING if running else _NOTHING
-        self._show_notes([each.record for each in found])
+        self._show_notes(found)
 
-    def _found(self, shown: Sequence[ShownLayout], threat: LoadCase) -> Iterator[_Found]:
+    def _found(
+        self, shown: Sequence[ShownLayout], threat: LoadCase, results: Mapping[str, Blasts]
+    ) -> Iterator[_Found]:
         """Yield every blast that is complete, with the addresses of its pictures."""
         session = self._session
         for each in shown:
-            record = session.folder.record_of(each.key)
-            if record is None:
+            drawn = session.folder.pictures_of(each.key)
+            blasts = results.get(each.name)
+            if blasts is None or threat not in blasts.threats or not drawn:
                 continue
             where = f"/blasts/{session.folder.design_id}/{each.key}"
-            pictures = {own.label: f"{where}/{own.file}" for own in record.pictures}
+            pictures = {own.label: f"{where}/{own.file}" for own in drawn}
             judged = (own.building for own in session.judged(each, threat))
             damage = {f"{_DAMAGE}{session.scenario.title_of(own)}": own for own in judged}
-            yield _Found(each, record, pictures, damage)
+            yield _Found(each, blasts, blasts.threats.index(threat), pictures, damage)
 
     def _offer(self, found: Sequence[_Found]) -> None:
         labels = (label for each in found for label in (*each.pictures, *each.damage))
@@ -167,10 +167,10 @@ class ResultsView:
         name = found.shown.name
         with ui.element("figure").classes("be-card m-0"):
             with ui.row().classes("w-full items-center no-wrap"):
-                title = name if name == BARE else f"layout {name}"
+                title = name if name == NO_BARRIER else f"layout {name}"
                 ui.label(title).style("font-weight: 600; white-space: nowrap")
                 ui.space()
-                ui.label(self._summary(name, found.record)).classes("be-quiet")
+                ui.label(self._summary(found)).classes("be-quiet")
             image = ui.element("img").props(f'alt="{self._what}, {title}"')
             if self._what in found.pictures:
                 image.props(f'src="{found.pictures[self._what]}"')
@@ -186,15 +186,16 @@ class ResultsView:
         if png is not None and not image.is_deleted:
             image.props(f'src="{address_of(png)}"')
 
-    def _summary(self, name: str, record: BlastRecord) -> str:
+    def _summary(self, found: _Found) -> str:
         noun = self._session.scenario.objective.noun
         noun = "mean impulse on protected facades" if noun == "impulse" else noun
         parts = sum(each.protected for each in self._session.scenario.structures)
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
-        return f"{noun}: {self._loads[name, record.threat]}{added}"
+        return f"{noun}: {headline(found.blasts, found.number).text(TYPOGRAPHIC)}{added}"
 
-    def _show_notes(self, records: list[BlastRecord]) -> None:
+    def _show_notes(self, found: Sequence[_Found]) -> None:
+        records = [each.blasts.records[each.shown.name][each.number] for each in found]
         self._notes.clear()
         with self._notes:
-            for note in dict.fromkeys(note for each in records for note in each.notes):
+            for note in dict.fromkeys(note for each in records for note in each.complete.notes):
                 ui.label(f"note: {note}").classes("be-quiet")

@@ -4,10 +4,11 @@ from typing import Final
 
 from nicegui import background_tasks, run, ui
 
-from blast_env.app.page.tables import address_of, cells, text_table
+from blast_env.answers.document import Table
+from blast_env.answers.page import address_of, fill, text_table
 from blast_env.app.session import NO_FACADE, Session
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.screening import (
+from blast_env.evaluation.questions.screening import (
     LEFT_OUT,
     STAND_OFF_HEADERS,
     THREAT_HEADERS,
@@ -50,7 +51,7 @@ class ScreeningView:
                 element.on_value_change(self.refresh)
         with ui.element("div").classes("be-results"):
             self._said = ui.label().classes("be-quiet").props('aria-live="polite"')
-            self._threats = text_table(THREAT_HEADERS)
+            self._threats = text_table()
             self._picture = ui.element("img").props('alt="stand-offs as rings"').classes("w-full")
             self._threats.visible = self._picture.visible = False
             self._stand_offs = ui.column().classes("w-full gap-1")
@@ -103,12 +104,14 @@ class ScreeningView:
         found, picture = answer
         self._said.text = f"required: {required.words}; worst place of each threat by damage"
         rows = [found.threat_row(each, [required]) for each in found.threats]
-        self._threats.rows = cells(rows)
+        fill(self._threats, Table.of("", THREAT_HEADERS, rows, len(THREAT_HEADERS)))
         self._picture.props(f'src="{picture}"')
         with self._stand_offs:
             for each in found.threats:
                 ui.label(f"stand-off (m) for each level, {each.name} (* on this site)")
-                text_table(STAND_OFF_HEADERS).rows = cells(found.stand_off_rows(each))
+                of_each = found.stand_off_rows(each)
+                table = Table.of("", STAND_OFF_HEADERS, of_each, len(STAND_OFF_HEADERS))
+                fill(text_table(), table)
 
 
 def _answer(

@@ -5,13 +5,12 @@ from pathlib import Path
 
 from nicegui import ui
 
+from blast_env.answers.page import show
 from blast_env.app.page.numbers import NumberField
-from blast_env.app.page.tables import cells, text_table
 from blast_env.app.page.uploads import complain
 from blast_env.app.session import Session
 from blast_env.app.work import Answer, Question
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import AnswerTable
 from blast_env.gas.cost import cost_words
 from blast_env.response.buildings import LevelOfProtection
 
@@ -85,9 +84,4 @@ def _show(answer: Answer, is_present: bool) -> None:
         ui.label("The site, the layout or the threats have changed since: ask again.").classes(
             "be-refused"
         )
-    for number, part in enumerate(answer.parts):
-        if isinstance(part, AnswerTable):
-            ui.label(part.title).classes("be-quiet")
-            text_table(part.headers, part.text_columns).rows = cells(part.rows)
-        else:
-            ui.label(part).classes("" if number else "text-bold")
+    show(answer.document)

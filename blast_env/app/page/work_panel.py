@@ -95,7 +95,7 @@ class WorkPanel:
         self._cards: list[_Card] | None = None
         self._refusal: ui.notification | None = None
         self._seen: object = None
-        self._there: tuple[frozenset[str], ...] = ()
+        self._there: tuple[frozenset[str], bool] | None = None
         self._build()
 
     @property
@@ -307,9 +307,8 @@ class WorkPanel:
         self._cost.text = cost_words([*costs, *session.cost_of_error(slots)], drawn=len(costs))
 
     @property
-    def _files_there(self) -> tuple[frozenset[str], ...]:
-        folder = self._session.folder
-        return folder.blasts_there(), folder.coarse_there()
+    def _files_there(self) -> tuple[frozenset[str], bool]:
+        return self._session.folder.blasts_there(), self._session.is_at_work
 
     def _say_cost_of_search(self) -> None:
         costs = []

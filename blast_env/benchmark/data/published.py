@@ -10,7 +10,8 @@ import numpy as np
 
 from blast_env.benchmark.data.gas_blasts import load
 from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
-from blast_env.evaluation.engines import BlastLoads, StructureLoad, find_engine
+from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.record import BlastLoads, StructureLoad
 from blast_env.layout import LayoutState
 from blast_env.site import Charge, Scenario
 

@@ -17,7 +17,7 @@ from blast_env.design.search.moves import Moves, legal_part
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError, DesignProblem
-from blast_env.evaluation.consequences import Verdict
+from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant

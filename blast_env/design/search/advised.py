@@ -3,8 +3,8 @@
 A layout that the search passes and the judge fails is searched for again, with a margin.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from blast_env.design.search.advice import (
@@ -16,19 +16,12 @@ from blast_env.design.search.advice import (
     kinds_for,
 )
 from blast_env.evaluation import BlastEvaluator, DesignProblem
-from blast_env.evaluation.answers import AnswerPart, AnswerTable
-from blast_env.evaluation.consequences import Consequences, Verdict
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.contract import Engine
-from blast_env.evaluation.grid_error import GridError, grid_error
-from blast_env.evaluation.probability import (
-    DRAWS,
-    Uncertainty,
-    level_probability,
-    probability_text,
-)
-from blast_env.evaluation.shared import consequences
-from blast_env.geometry import Layout, layout_words
-from blast_env.layout import LayoutState
+from blast_env.evaluation.questions.grid_error import GridError
+from blast_env.evaluation.questions.probability import Uncertainty, level_probability
+from blast_env.evaluation.questions.verdict import Consequences, Verdict, consequences_of
+from blast_env.geometry import Layout
 from blast_env.layout.placement import load_relevant
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import ProgressCallback, share_of
@@ -40,11 +33,6 @@ ROUNDS: Final = 3
 
 _PROBABLE_MARGIN: Final = 0.3
 """Margin in damage levels after a layout failed before a judge who wants a probability."""
-
-_HEADERS: Final = (
-    *("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks"),
-    "probability",
-)
 
 
 def site_with_target(
@@ -114,8 +102,7 @@ class AdviceJudge:
     def verdict(self, layout: Layout) -> Verdict:
         """Return the verdict on a layout; it takes a blast per charge, once."""
         if layout not in self.judged:
-            charges = [each.charge for each in self.problem.threats]
-            self.judged[layout] = consequences(self.evaluator, layout, charges)
+            self.judged[layout] = consequences_of(self._campaign(layout).run())
             likely = level_probability(self.judged[layout], Uncertainty(mass=self._mass_error))
             self.shares[layout] = likely.of(self.target)
         found = self.judged[layout].verdict(self.target)
@@ -123,17 +110,20 @@ class AdviceJudge:
         return found if self.shares[layout] >= wanted else min(found, Verdict.PASSES_BARELY)
 
     def error(self, layout: Layout) -> GridError | None:
-        """Return the grid error for a judged layout.
+        """Return the grid error for a judged layout, from the charge that governs.
 
         The search's blasts serve it if their cells are twice as large as the judge's.
         """
-        fine, unprotected = self.judged[layout], self.judged[()]
-        threat = self.problem.threats[fine.worst_number]
-        of_both = fine.loads[fine.worst_number], unprotected.loads[fine.worst_number]
         coarser: BlastEvaluator | None = self.problem.evaluator
         if self.engine.coarser != self.problem.evaluator.engine:
             coarser = self.evaluator.coarser()
-        return grid_error(coarser, self.problem.case, load_relevant(layout), threat, of_both)
+        campaign = replace(self._campaign((), load_relevant(layout)), coarser=coarser)
+        number = self.judged[layout].worst_number
+        return GridError.of(campaign.run(worst=lambda _: number))
+
+    def _campaign(self, *layouts: Layout) -> Campaign:
+        named = {str(number): each for number, each in enumerate(layouts)}
+        return Campaign(self.problem.case, named, self.evaluator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,81 +142,6 @@ class AdviceResult:
     def best(self) -> Advice:
         """The best layout of all."""
         return best_of(self.found, self.judge.verdict)
-
-    def answer(self) -> Iterator[AnswerPart]:
-        """Yield the cost to pass, flags, the grid error, and the table of the kinds."""
-        judge, best = self.judge, self.best
-        scenario, target = judge.scenario, judge.target
-        yield self._first_line(best)
-        yield from (f"flag: {note}" for note in judge.judged[best.layout].notes)
-        error = judge.error(best.layout)
-        if error is not None:
-            yield error.impulse_words
-            yield error.words
-        rows = []
-        for each in self.found:
-            seen = judge.judged[each.layout]
-            rows.append(
-                (
-                    each.kind,
-                    layout_words(each.layout),
-                    f"{LayoutState(scenario, each.layout).cost:,.10g}",
-                    str(each.blasts),
-                    min(seen.level(building) for building in seen.buildings).label,
-                    "yes" if each.passes else "no",
-                    Verdict.of(seen.passes_on_cells(target)).word(seen.is_flagged).lower(),
-                    seen.verdict_word(target).lower(),
-                    probability_text(judge.shares[each.layout], DRAWS),
-                )
-            )
-        zone = scenario.zone
-        budget = "no limit" if zone.budget is None else zone.priced(zone.budget)
-        title = f"{scenario.name}: budget {budget}, required level {target.label!r}"
-        yield AnswerTable.of(title, _HEADERS, rows, 2)
-        yield (
-            f"passes: by the search; judged: {judge.engine.words}; level, sharp peaks: the same "
-            "impulses with peaks that cells do not clip as well; probability: of the required "
-            "level."
-        )
-
-    def _first_line(self, best: Advice) -> str:
-        """Return the answer in a line or two: the cost to pass, and whether walls help."""
-        judge = self.judge
-        scenario, target = judge.scenario, judge.target
-        by_kind = {each.kind: each for each in self.found}
-        cost = LayoutState(scenario, best.layout).cost
-        flagged = " (flagged)" if judge.judged[best.layout].is_flagged else ""
-        wanted = scenario.objective.target_probability
-        likely = probability_text(judge.shares[best.layout], DRAWS)
-        if judge.verdict(best.layout) is not Verdict.PASSES:
-            least = (
-                ""
-                if wanted is None
-                else f" with a probability of {wanted:g}; the best has {likely}"
-            )
-            answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}{least}."
-        elif not best.layout:
-            answer = (
-                f"{scenario.name}: the empty site reaches {target.label!r} with {likely}{flagged}."
-            )
-        else:
-            words = layout_words(best.layout)
-            level = f"{target.label!r} with {likely}"
-            price = scenario.zone.priced(cost)
-            answer = f"{scenario.name}: {level} costs {price}{flagged}: {words}."
-        shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
-        if shield is None or judge.judged[shield.layout].passes(target):
-            return answer
-        barrier = set(load_relevant(best.layout))
-        gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0
-        if best.passes and not barrier:
-            return f"Walls are worth nothing here: better components alone are cheaper. {answer}"
-        if gain < 0.01:
-            return (
-                "Walls alone are worth nothing here: they change the shortfall by "
-                f"{gain:.1%}. {answer}"
-            )
-        return answer
 
 
 def advised(

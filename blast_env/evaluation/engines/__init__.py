@@ -8,15 +8,14 @@ from blast_env.evaluation.engines.contract import (
     ENGINE_NAMES,
     JUDGE,
     PAPER_ENGINES,
-    BlastLoads,
     Engine,
-    StructureLoad,
     default_engine,
     final_engine,
     find_engine,
 )
 from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
 from blast_env.evaluation.engines.simulate import simulate
+from blast_env.evaluation.record import BlastLoads, StructureLoad
 
 __all__ = [
     "CALIBRATED_ENGINES",

@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import cbrt
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
+from blast_env.evaluation.record import UnjudgedWalls
 from blast_env.evaluation.standing import STANDING_COLUMNS, ReasonedStanding, bay_standings
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
@@ -140,37 +141,12 @@ class BayLoads:
         """Return whether the load of each bay was known at the end of the run, by its name."""
         names = [each.name for each in run.site.structures]
         come = {name: run.has_come(index) for index, name in enumerate(names)}
-        net = impulses(self.response.time_s, self.response.pressure_pa)
+        net = impulses(*self.histories)
         known = is_known(net.max(axis=1, initial=0.0), net[:, -1])
         return {
             filled.bay.name: come[filled.bay.structure] and is_one
             for filled, is_one in zip(self.bays, known.tolist(), strict=True)
         }
-
-
-class UnjudgedWalls(NamedTuple):
-    """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
-
-    Attributes:
-        building: Name of the building.
-        area_m2: Area of these walls that touches air, m2.
-        of_m2: Area of all counted walls of the building that touches air, m2.
-        structures: The parts of the building with such walls.
-    """
-
-    building: str
-    area_m2: float
-    of_m2: float
-    structures: tuple[str, ...]
-
-    @property
-    def words(self) -> str:
-        """A sentence that states the area and the parts."""
-        parts = ", ".join(self.structures)
-        return (
-            f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
-            "no verdict covers them"
-        )
 
 
 def unjudged_walls(

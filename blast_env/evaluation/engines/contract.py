@@ -11,277 +11,29 @@ An instance is accepted wherever an engine's name is. An entry point registers a
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Protocol, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
-from blast_env.evaluation.standing import UNSTATED, ReasonedStanding, worst_standing
+from blast_env.evaluation.record import BlastLoads, BlastRecord
 from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.site import (
     AnyCharge,
     AnyScenario,
-    ObjectiveSection,
     Scenario,
     find_scenario,
 )
-from blast_env.site.facade import NamedBay
-from blast_env.site.structures import StructureSection
-from blast_env.statistics import counted_parts, mean_over_area
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
 
     from blast_env.gas.cost import CostGuess
-
-
-@dataclass(frozen=True)
-class StructureLoad:
-    """The load on one structure.
-
-    Attributes:
-        name: Name of the structure.
-        protected: Whether its load counts.
-        weight: Its weight among the protected structures.
-        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
-            dynamics the peak specific impulse, averaged over the counted walls.
-        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
-        peak_weight: Weight of the peak among the protected structures.
-        in_range: Whether this distance and charge lie in the range of the calibration.
-        notes: Reasons if they do not, one sentence each.
-        building: The building that it is part of; its own name if it is a building by itself.
-        area_m2: Area of the counted walls; `None` where the engine has no areas.
-        response: Response of its bays in the objective; `None` unless the objective is a response.
-        worst_damage: The largest damage of its bays, for the same objective.
-        stood: Standing of the load, with its reason.
-        impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
-    """
-
-    name: str
-    protected: bool
-    weight: float
-    impulse_pa_s: float
-    peak_pa: float | None
-    peak_weight: float
-    in_range: bool
-    notes: tuple[str, ...]
-    building: str
-    area_m2: float | None = None
-    response: float | None = None
-    worst_damage: float | None = None
-    stood: ReasonedStanding = UNSTATED
-    impulse_sim: float | None = None
-
-    @classmethod
-    def on(
-        cls,
-        structure: StructureSection,
-        impulse_pa_s: float,
-        peak_pa: float | None = None,
-        in_range: bool = False,
-        **others: Any,
-    ) -> Self:
-        """Return the load on a structure of a scenario; `others` are further attributes."""
-        return cls(
-            name=structure.name,
-            protected=structure.protected,
-            weight=structure.weight,
-            impulse_pa_s=impulse_pa_s,
-            peak_pa=peak_pa,
-            peak_weight=structure.counted_peak_weight,
-            in_range=in_range,
-            building=structure.building_name,
-            **({"notes": ()} | others),
-        )
-
-
-def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
-    """Combine the loads on structures into loads on buildings.
-
-    Impulses are means over the area of the counted walls. Where the engine has no areas, the
-    weights of the structures replace them.
-    """
-    parts: dict[str, list[StructureLoad]] = {}
-    for load in loads:
-        parts.setdefault(load.building, []).append(load)
-    found = []
-    for name, own in parts.items():
-        if len(own) > 1:
-            found.append(_on_building(name, own))
-        else:
-            found.append(own[0] if own[0].name == name else replace(own[0], name=name))
-    return tuple(found)
-
-
-def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
-    counted = counted_parts(parts)
-    areas_m2 = [each.area_m2 for each in counted if each.area_m2 is not None]
-    weights = [each.weight for each in counted]
-    is_known = len(areas_m2) == len(counted)
-    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
-    impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
-    hit = [each.impulse_sim for each in parts if each.impulse_sim is not None]
-    return replace(
-        counted[0],
-        name=name,
-        weight=sum(weights),
-        impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
-        peak_pa=max(peaks_pa, default=None),
-        in_range=all(each.in_range for each in counted),
-        area_m2=sum(areas_m2) if is_known else None,
-        stood=worst_standing(each.stood for each in counted),
-        impulse_sim=sum(hit) if hit else None,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class BlastLoads:
-    """The loads of one blast on all structures, without the barrier.
-
-    Attributes:
-        structures: One load per structure, in the order of the scene.
-        module_impulse: Load on each module of the structures, in the order of the scene (modules,):
-            of particles the sum of m |v|, simulation units; of gas the momentum on its walls, N s.
-        bays: Damage of the bays of facades with each of their possible components; empty unless
-            the objective is a response.
-    """
-
-    structures: tuple[StructureLoad, ...]
-    module_impulse: NDArray[np.float64]
-    bays: tuple[BayDamage, ...] = ()
-
-    def with_facades(
-        self, named: Collection[NamedBay], objective: ObjectiveSection
-    ) -> "BlastLoads":
-        """Return the loads with the response of given facades, without another blast.
-
-        Raises:
-            BlastEnvError: If the bays were not recorded.
-        """
-        if not self.bays:
-            raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
-        responded = []
-        for load in self.structures:
-            own = [each for each in self.bays if each.structure == load.name]
-            response, most = structure_response(own, named, objective)
-            responded.append(replace(load, response=response, worst_damage=most))
-        return replace(self, structures=tuple(responded))
-
-    @property
-    def has_particles(self) -> bool:
-        """Whether these are loads by a particle engine."""
-        return any(load.impulse_sim is not None for load in self.structures)
-
-    @property
-    def level(self) -> LevelOfProtection:
-        """The level of protection of the facades of the protected structures."""
-        return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
-
-    def are_for(self, scenario: AnyScenario) -> bool:
-        """Return whether these can be the loads of a scenario.
-
-        They must be finite, one per structure and module, with its bays where it needs them.
-        """
-        found = find_scenario(scenario)
-        names = [structure.name for structure in found.structures]
-        modules = sum(structure.modules for structure in found.structures)
-        impulses = np.array([load.impulse_pa_s for load in self.structures])
-        return (
-            [load.name for load in self.structures] == names
-            and self.module_impulse.shape == (modules,)
-            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse).all())
-            and self._has_bays_of(found)
-        )
-
-    def _has_bays_of(self, scenario: Scenario) -> bool:
-        """Return whether the bays and components are the scenario's, and the damage is finite."""
-        if not scenario.objective.is_response:
-            return not self.bays
-        known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
-        return bool(self.bays) and all(
-            known.get(each.name) == set(each.damage)
-            and np.isfinite([*each.damage.values(), each.area_m2, each.glazed_m2]).all()
-            for each in self.bays
-        )
-
-    @cached_property
-    def protected(self) -> tuple[StructureLoad, ...]:
-        """The loads on the protected structures."""
-        return tuple(load for load in self.structures if load.protected)
-
-    @cached_property
-    def _buildings(self) -> tuple[StructureLoad, ...]:
-        """The loads on the protected buildings."""
-        return on_buildings(self.protected)
-
-    @property
-    def protected_impulse_pa_s(self) -> float:
-        """Weighted sum of the impulses of the protected buildings, Pa*s."""
-        return sum(each.weight * each.impulse_pa_s for each in self._buildings)
-
-    @property
-    def protected_impulse_sim(self) -> float | None:
-        """Weighted sum of the impulses of the protected structures, simulation units.
-
-        `None` of an engine without particles.
-        """
-        sims = [(x.weight, x.impulse_sim) for x in self.protected if x.impulse_sim is not None]
-        return sum(weight * impulse for weight, impulse in sims) if sims else None
-
-    @property
-    def protected_peak_pa(self) -> float:
-        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
-        peaks = [load.peak_pa for load in self.protected]
-        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
-
-    def load(self, objective: ObjectiveSection) -> float:
-        """Return the load of the protected structures that an objective selects, in its unit."""
-        impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
-        return sum(
-            objective.load(
-                impulse_pa_s[load.building],
-                load.peak_pa or 0.0,
-                load.weight,
-                load.peak_weight,
-                load.response,
-            )
-            for load in self.protected
-        )
-
-    @property
-    def in_range(self) -> bool:
-        """Whether the load on every protected structure is in the range of the calibration."""
-        return all(load.in_range for load in self.protected)
-
-
-def structure_response(
-    bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
-) -> tuple[float, float]:
-    """Return the response of one structure in the objective, and the largest damage of its bays.
-
-    `bays` has their damage with each of their possible components, `named` the components of all
-    bays.
-    """
-    chosen = {each.bay.name: each for each in named}
-    is_glazing = objective.measure == "glazing"
-    damage, area_m2 = [], []
-    for each in bays:
-        bay = chosen[each.name]
-        names = (bay.glazing,) if is_glazing else (bay.glazing, bay.wall)
-        damage.append(worst(each.damage[name] for name in names if name is not None))
-        area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
-    return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
 
 
 class BlastOutcome(Protocol):
@@ -339,6 +91,16 @@ class EngineBlast(NamedTuple):
     seed: int
 
 
+class BlastDrawing(Protocol):
+    """Draws blasts, each while its result is in memory."""
+
+    def recorders(self, blast: Any) -> Callable[[Any], Sequence[Any]]:
+        """Return what makes the recorders that its pictures need, as for `GasBlast.run`."""
+
+    def draw(self, found: Any) -> None:
+        """Draw a finished blast, a `blast_env.evaluation.engines.gas.RecordedBlast`."""
+
+
 class Engine(ABC):
     """Computes the loads of blasts on a site.
 
@@ -349,6 +111,7 @@ class Engine(ABC):
         has_peaks: Whether it computes overpressures as well as impulses.
         at_once: Largest number of blasts that take less time together than one by one.
         needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
+        is_complete: Whether its records are complete, with walls and bays; see `BlastRecord`.
         title: Its kind, for display.
         validated_range: The range in which it was validated, for "outside ...".
         options: Names of the settings that only this engine has.
@@ -360,6 +123,7 @@ class Engine(ABC):
     has_peaks: ClassVar[bool] = False
     at_once: ClassVar[int] = 1
     needs_calibration: ClassVar[bool] = False
+    is_complete: ClassVar[bool] = False
     title: ClassVar[str] = "Own engine"
     validated_range: ClassVar[str] = "the validated range of the engine"
     options: ClassVar[tuple[str, ...]] = ()
@@ -381,6 +145,22 @@ class Engine(ABC):
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the loads of several blasts, by default one after the other."""
         return [self.loads(*each) for each in blasts]
+
+    def record(
+        self,
+        blast: EngineBlast,
+        progress: Callable[[float], None] | None = None,  # noqa: ARG002
+        drawing: BlastDrawing | None = None,  # noqa: ARG002
+    ) -> BlastRecord:
+        """Run a blast and return its record, by default with the loads alone.
+
+        Args:
+            blast: The blast.
+            progress: Called with the elapsed share of the blast, by engines that know it.
+            drawing: Draws the blast, of engines that have something to draw.
+        """
+        (loads,) = self.loads_at_once([blast])
+        return BlastRecord(loads)
 
     def blast(
         self,
@@ -442,6 +222,11 @@ class Engine(ABC):
     def coarser(self) -> "Engine | None":
         """The engine with cells twice as large, for their error; `None` if it has none."""
         return None
+
+    @property
+    def smallest_m(self) -> float:
+        """Side of its smallest cells, m; 0 if it has none."""
+        return 0.0
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:  # noqa: ARG002
         """Describe the engine in one line.

@@ -17,19 +17,20 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.engines.bays import (
-    LOADED_BAY_COLUMNS,
-    BayLoads,
-    UnjudgedWalls,
-    unjudged_walls,
-)
+from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, BayLoads, unjudged_walls
 from blast_env.evaluation.engines.contract import (
-    BlastLoads,
+    BlastDrawing,
     Engine,
+    EngineBlast,
     RunnableBlast,
-    StructureLoad,
 )
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
+from blast_env.evaluation.record import (
+    BlastLoads,
+    BlastRecord,
+    StructureLoad,
+    UnjudgedWalls,
+)
 from blast_env.evaluation.standing import (
     NOT_KNOWN,
     STANDING_COLUMNS,
@@ -73,6 +74,7 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import WALLS, BlastSite, Charge
 from blast_env.site.sight import in_sight
+from blast_env.site.structures import buildings_of
 from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import counted_parts, mean_over_area
 from blast_env.tables import table_of, texts
@@ -81,7 +83,10 @@ from blast_env.units import MODULE_SIDE_M
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
+    from blast_env.evaluation.engines.walls import WallHistories
     from blast_env.gas.engine import GasRun, Recorders
+    from blast_env.gas.grid import GasGrid
+    from blast_env.gas.solver import Recorder
     from blast_env.tables import RunRecord
 
 _AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
@@ -114,6 +119,7 @@ class GasEngine(GasSettings, Engine):
     """Computes blasts in a compressible gas, in compiled code; for settings see `GasSettings`."""
 
     has_peaks: ClassVar[bool] = True
+    is_complete: ClassVar[bool] = True
     title: ClassVar[str] = "Gas dynamics"
     validated_range: ClassVar[str] = "the validated range of gas dynamics"
     options: ClassVar[tuple[str, ...]] = ("cell_m", "cells", "until")
@@ -131,6 +137,19 @@ class GasEngine(GasSettings, Engine):
     ) -> "GasBlast":
         """Return one blast, for running and inspection."""
         return GasBlast(find_scenario(scenario), layout, seed, self, charge)
+
+    def record(
+        self,
+        blast: EngineBlast,
+        progress: Callable[[float], None] | None = None,
+        drawing: BlastDrawing | None = None,
+    ) -> BlastRecord:
+        """Run a blast, draw it, and return its complete record."""
+        scenario, layout, charge, seed = blast
+        found = GasBlast(scenario, layout, seed, self, charge).recorded(progress, drawing)
+        if drawing is not None:
+            drawing.draw(found)
+        return found.record
 
     def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
         """Return an estimate of the cost of a blast, without building its grid."""
@@ -223,6 +242,39 @@ class GasBlast(RunnableBlast):
             if progress is not None:
                 progress(min(run.time_s / run.limit_s, 1.0))
         return result
+
+    def recorded(
+        self,
+        progress: Callable[[float], None] | None = None,
+        drawing: BlastDrawing | None = None,
+    ) -> "RecordedBlast":
+        """Run the blast and return it with its complete record; `drawing` adds recorders."""
+        # Here, because it imports Numba, which takes half a second.
+        from blast_env.evaluation.engines.walls import WallHistories, record_of
+
+        histories = WallHistories(buildings_of(self.scenario.structures), self.site)
+        more = None if drawing is None else drawing.recorders(self)
+
+        def recorders(grid: "GasGrid") -> "tuple[Recorder, ...]":
+            return (histories, *(() if more is None else more(grid)))
+
+        result = self.run(progress, recorders)
+        return RecordedBlast(result, histories, record_of(result, histories))
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBlast:
+    """A finished blast with its record.
+
+    Attributes:
+        result: The blast.
+        histories: Mean overpressures on walls.
+        record: The record.
+    """
+
+    result: "GasResult"
+    histories: "WallHistories"
+    record: BlastRecord
 
 
 @dataclass(frozen=True, eq=False)

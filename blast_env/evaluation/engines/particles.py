@@ -14,13 +14,8 @@ from typing import TYPE_CHECKING, ClassVar, Final, Literal
 import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
-from blast_env.evaluation.engines.contract import (
-    BlastLoads,
-    Engine,
-    RunnableBlast,
-    StructureLoad,
-    find_engine,
-)
+from blast_env.evaluation.engines.contract import Engine, RunnableBlast, find_engine
+from blast_env.evaluation.record import BlastLoads, StructureLoad
 from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
 from blast_env.geometry import Element, layout_text
 from blast_env.particles.calibration.model import (

@@ -5,7 +5,7 @@ length; a square piece is loaded along both axes, of which the worse counts. A s
 another piece or a building carries no load. Support by neighbouring pieces is ignored.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -14,7 +14,6 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.geometry import Element, Piece
 from blast_env.response.barriers import PieceResponses, RigidPiece, piece_responses
 from blast_env.site import Scenario
@@ -22,7 +21,7 @@ from blast_env.site.blast_site import WALLS, module_name
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import BuildZone
 from blast_env.tables import Column, table_of
-from blast_env.units import MODULE_SIDE_M, MS_PER_S, PA_PER_KPA
+from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
@@ -49,12 +48,6 @@ PIECE_COLUMNS: Final = (
     Column("falls_in_blast", "", "whether it overturns before the blast is over"),
 )
 """One row per piece of a barrier, or per module of a barrier without pieces."""
-
-_PIECE_HEADERS: Final = (
-    *("piece", "response", "mass (kg)", "net peak (kPa)", "net impulse (Pa s)"),
-    *("sliding (m)", "tilt (1: overturned)", "overturned at (ms)"),
-)
-_MOST_PIECES: Final = 12
 
 
 class _Way(NamedTuple):
@@ -264,31 +257,3 @@ def outcome_words(pieces: "pd.DataFrame") -> str:
         f"{n} {'barrier' if n == 1 else 'barriers'} {_VERBS[str(word)][n > 1]}"
         for word, n in counts
     )
-
-
-def pieces_answer(pieces: "pd.DataFrame", title: str) -> Iterator[AnswerPart]:
-    """Yield the table of a barrier's pieces, the largest movement first, if there are any.
-
-    Args:
-        pieces: One row per piece; see `PIECE_COLUMNS`.
-        title: Title of the table, before the counts of the outcomes.
-    """
-    if not len(pieces):
-        return
-    ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
-    rows = [
-        (
-            row["piece"],
-            row["outcome"],
-            f"{row['mass_kg']:,.0f}",
-            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
-            f"{row['impulse_pa_s']:,.0f}",
-            f"{row['slide_m']:.2f}",
-            f"{row['tilt']:.2f}",
-            "-" if np.isnan(row["overturn_s"]) else f"{MS_PER_S * row['overturn_s']:,.0f}",
-        )
-        for row in ordered.head(_MOST_PIECES).to_dict("records")
-    ]
-    yield AnswerTable.of(f"{title}: {outcome_words(pieces)}", _PIECE_HEADERS, rows, 2)
-    if len(ordered) > _MOST_PIECES:
-        yield f"and {len(ordered) - _MOST_PIECES} more pieces with smaller movements"

@@ -12,8 +12,8 @@ from blast_env.cli import app
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario, save_scenario
+from tests.blasts import consequences
 from tests.gas_sites import glazed_hut
 
 FACADE = {"storeys": 2, "glazing": "low", "wall": "brick_215"}

@@ -11,11 +11,11 @@ from math import log
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import AnswerPart, AnswerTable
-from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.probability import MASS_RANGE, scaled_to
-from blast_env.evaluation.shared import consequences
+from blast_env.evaluation.questions.probability import MASS_RANGE, scaled_to
+from blast_env.evaluation.questions.verdict import Consequences, check_facades, consequences_of
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import charge_against
 from blast_env.response.buildings import LevelOfProtection
@@ -30,7 +30,9 @@ RUNGS: Final = 5
 MOST_BLASTS: Final = 4 * RUNGS + 1
 """Most blasts of a ladder for masses and stand-offs."""
 
-_LEVELS: Final = tuple(LevelOfProtection)[1:]
+LEVELS: Final = tuple(LevelOfProtection)[1:]
+"""The levels of protection that a charge may keep, the lowest first."""
+
 _STEP: Final = MASS_RANGE**2
 _BISECTIONS: Final = 6
 
@@ -50,18 +52,6 @@ class Edge:
     stand_off_m: float
     is_kept: bool = True
     is_end: bool = False
-
-    @property
-    def mass_text(self) -> str:
-        """The mass in kg, with the sign of a bound at an end of the ladder."""
-        sign = (">= " if self.is_kept else "< ") if self.is_end else ""
-        return f"{sign}{self.charge.tnt_kg:.3g}"
-
-    @property
-    def stand_off_text(self) -> str:
-        """The stand-off in m, with the sign of a bound at an end of the ladder."""
-        sign = ("<= " if self.is_kept else "> ") if self.is_end else ""
-        return f"{sign}{self.stand_off_m:.1f}"
 
 
 def mass_near(judged: Consequences, level: LevelOfProtection) -> tuple[float, bool]:
@@ -173,7 +163,8 @@ class Ladder:
 
     def _blast(self, charge: Charge, number: int) -> Consequences | None:
         try:
-            return consequences(self.evaluator, self.layout, [charge])
+            case = LoadCaseSet(self.scenario, (LoadCase(charge),))
+            return consequences_of(Campaign(case, {"": self.layout}, self.evaluator).run())
         except BlastEnvError:
             if number == 0:
                 raise
@@ -190,11 +181,26 @@ class Ladder:
         nearest = known[min(known, key=lambda number: abs(number - at))]
         return scaled_to(nearest, self.charge_at(severity, nearer))
 
-    @property
-    def place(self) -> str:
-        """The place of the charge in words."""
-        x_m, y_m = self.charge.position_m
-        return f"{x_m:.1f}, {y_m:.1f}"
+
+@dataclass(frozen=True)
+class PlaceCapacity:
+    """The most severe charges at one place that keep the levels of protection.
+
+    Attributes:
+        layout: Name of the layout.
+        charge: The charge of the scenario at the place.
+        stand_off_m: Its distance from the nearest protected wall.
+        heavier: The largest mass for each level, the lowest first.
+        nearer: The least stand-off for each level.
+        blasts: Number of blasts that ran for it.
+    """
+
+    layout: str
+    charge: Charge
+    stand_off_m: float
+    heavier: tuple[Edge, ...]
+    nearer: tuple[Edge, ...]
+    blasts: int
 
 
 def capacity(
@@ -202,48 +208,31 @@ def capacity(
     layouts: Mapping[str, Layout],
     charges: Sequence[AnyCharge],
     progress: ProgressCallback | None = None,
-) -> list[AnswerPart]:
+) -> tuple[PlaceCapacity, ...]:
     """Return the largest masses and the least stand-offs that keep each level of protection.
 
     A few blasts run at each place. The stand-off changes along the line from the nearest protected
-    wall to the charge. Both tables have one row per layout and place.
+    wall to the charge.
 
     Args:
         evaluator: Its scenario, its engine, and its store of blasts.
         layouts: The layouts by name.
         charges: The charges; their places count.
         progress: Called with the finished share of the places.
+
+    Raises:
+        BlastEnvError: If no structure has a facade, or the engine records no bays.
     """
-    scenario, blasts = evaluator.scenario, 0
-    masses: list[tuple[str, ...]] = []
-    stand_offs: list[tuple[str, ...]] = []
+    check_facades(evaluator.scenario, evaluator.engine)
+    found = []
     pairs = [(name, charge) for name in layouts for charge in charges]
     for done, (name, charge) in enumerate(pairs, start=1):
-        layout = layouts[name]
-        ladder = Ladder(evaluator, layout, charge_against(scenario, layout, charge))
-        heavier = [ladder.edge(level) for level in _LEVELS]
-        nearer = [ladder.edge(level, nearer=True) for level in _LEVELS]
-        row, stand_off = (name, ladder.place), f"{heavier[0].stand_off_m:.1f} m"
-        masses.append((*row, stand_off, *(edge.mass_text for edge in heavier)))
-        mass = f"{ladder.charge.tnt_kg:g} kg"
-        stand_offs.append((*row, mass, *(edge.stand_off_text for edge in nearer)))
-        blasts += ladder.blasts
+        there = charge_against(evaluator.scenario, layouts[name], charge)
+        ladder = Ladder(evaluator, layouts[name], there)
+        heavier = tuple(ladder.edge(level) for level in LEVELS)
+        nearer = tuple(ladder.edge(level, nearer=True) for level in LEVELS)
+        off_m = stand_off_m(evaluator.scenario.loaded_walls, there.position_m)
+        found.append(PlaceCapacity(name, there, off_m, heavier, nearer, ladder.blasts))
         if progress is not None:
             progress(done / len(pairs))
-    keeps = "that keeps each level of protection"
-    levels = [each.label for each in _LEVELS]
-    return [
-        f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass",
-        AnswerTable.of(
-            f"{scenario.name}: largest charge (kg TNT) {keeps}",
-            ("layout", "place (m)", "stand-off", *levels),
-            masses,
-            2,
-        ),
-        AnswerTable.of(
-            f"{scenario.name}: least stand-off (m) {keeps}",
-            ("layout", "place (m)", "charge", *levels),
-            stand_offs,
-            2,
-        ),
-    ]
+    return tuple(found)

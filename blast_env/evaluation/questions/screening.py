@@ -19,7 +19,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.consequences import Verdict
+from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.evaluation.standing import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element

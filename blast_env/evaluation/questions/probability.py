@@ -29,8 +29,8 @@ import numpy as np
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.curves import Load, normally_reflected
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.consequences import BuildingResponse, Consequences
-from blast_env.evaluation.grid_error import GridError
+from blast_env.evaluation.questions.grid_error import GridError, impulse_of
+from blast_env.evaluation.questions.verdict import BuildingResponse, Consequences
 from blast_env.evaluation.standing import bay_places
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
@@ -123,7 +123,7 @@ class Uncertainty:
     @classmethod
     def of(cls, mass: float, error: GridError | None) -> "Uncertainty":
         """Return the uncertain quantities with the error of the cells of the impulse, if known."""
-        share = nan if error is None else error.of_load(lambda loads: loads.protected_impulse_pa_s)
+        share = nan if error is None else error.of_load(impulse_of)
         return cls(mass=mass, cells=0.0 if isnan(share) else share)
 
     def __post_init__(self) -> None:

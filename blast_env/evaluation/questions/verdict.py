@@ -18,7 +18,7 @@ In the open the first is exact. The second is within 7 % of Kingery and Bulmash'
 reflected pressure round the edges of a small wall, and coarse cells underestimate peaks.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
@@ -28,14 +28,17 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
-from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
-from blast_env.evaluation.engines.contract import BlastLoads
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.blasts import Blasts, Severity
+from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, bay_rows
+from blast_env.evaluation.engines.contract import Engine
+from blast_env.evaluation.questions.reduction import CHARGE_COLUMNS, charge_values
+from blast_env.evaluation.record import BlastRecord, UnjudgedWalls, WallLoad
 from blast_env.evaluation.standing import BayPlaces, ReasonedStanding, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
-from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
-from blast_env.gas.tables import means_by_wall
 from blast_env.geometry import Layout
+from blast_env.layout.build_site import build_site
+from blast_env.layout.placement import load_relevant
 from blast_env.response.buildings import (
     BuildingDamage,
     LevelOfProtection,
@@ -49,14 +52,13 @@ from blast_env.response.facade import (
     cells_of,
     force_words,
     peak_corrected,
-    peak_factor,
     respond,
 )
 from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
 from blast_env.response.walls import DamageLevel
-from blast_env.site import ObjectiveSection, Scenario
-from blast_env.site.blast_site import WALLS, BlastSite, Charge
+from blast_env.site import Scenario
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.facade import with_glass
 from blast_env.site.structures import buildings_of
 from blast_env.tables import Column, table_of
@@ -64,14 +66,10 @@ from blast_env.tables import Column, table_of
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
 
-    from blast_env.evaluation.engines.gas import GasResult
-
 _CLIPPED: Final = (
     "it complies with the peaks of the cells, which are clipped, but not with Kingery and"
     " Bulmash's sharp peaks of the same impulse: use smaller cells"
 )
-
-_BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
 
 class Verdict(IntEnum):
@@ -98,32 +96,6 @@ class Verdict(IntEnum):
         if self is not Verdict.PASSES:
             return "DOES NOT COMPLY"
         return "COMPLIES (flagged)" if flagged else "COMPLIES"
-
-
-@dataclass(frozen=True, order=True)
-class Severity:
-    """The severity of a blast, with attributes in the order of comparison; the largest governs.
-
-    Where facades count, the lower level of protection governs, then the larger damage of all
-    components. Ties, and sites without facades, are decided by the load.
-
-    Attributes:
-        lost_levels: Levels of protection below "high" of buildings with a facade.
-        damage: Total damage of all components, or the response in the objective.
-        load: The load, in the same unit for all compared blasts.
-    """
-
-    lost_levels: int = 0
-    damage: float = 0.0
-    load: float = 0.0
-
-    @classmethod
-    def of_loads(cls, loads: BlastLoads, objective: ObjectiveSection) -> "Severity":
-        """Return the severity of a blast by the objective of a site."""
-        counted = loads.load(objective)
-        if not objective.is_response:
-            return cls(load=counted)
-        return cls(4 - loads.level, counted, loads.protected_impulse_pa_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +247,6 @@ class Consequences:
         unchecked: A building and the reason to distrust its loads, one per charge and building
             with such a reason.
         unjudged: Walls of buildings with a facade that no verdict covers.
-        loads: Loads on the structures, one per charge.
     """
 
     responses: tuple[BuildingResponse, ...]
@@ -283,7 +254,6 @@ class Consequences:
     barriers: tuple[BarrierResponse, ...] = ()
     unchecked: tuple[tuple[str, str], ...] = ()
     unjudged: tuple[UnjudgedWalls, ...] = ()
-    loads: tuple[BlastLoads, ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
@@ -295,7 +265,6 @@ class Consequences:
             tuple(each for part in every for each in part.barriers),
             tuple(each for part in every for each in part.unchecked),
             tuple(dict.fromkeys(each for part in every for each in part.unjudged)),
-            tuple(each for part in every for each in part.loads),
         )
 
     @property
@@ -514,42 +483,64 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     return table_of(rows, BAY_CASE_COLUMNS)
 
 
-def consequences_of(
-    scenario: Scenario, result: "GasResult", charge: Charge, taken_away: Layout = ()
-) -> Consequences:
-    """Return the consequences of a finished blast for the buildings and the barrier.
+def check_facades(scenario: Scenario, engine: Engine) -> None:
+    """Refuse, before any blast, a site without a facade or an engine that records no bays.
 
-    `taken_away` are the pieces that were removed for the blast.
+    Raises:
+        BlastEnvError: If one of them is the case.
     """
-    responses: list[BuildingResponse] = []
-    if result.bay_loads.bays:
-        factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
-        known = result.bay_loads.known(result.run)
-        responses = by_building(scenario, result.bay_loads.response, result.run.site, factor, known)
-    return Consequences(
-        tuple(responses),
-        tuple(neighbours_of(scenario, result, charge)),
-        (BarrierResponse(charge, result.pieces, taken_away),),
-        tuple(_unchecked(scenario, result)),
-        result.unjudged,
-        (BlastLoads(result.structure_loads, result.module_impulse_n_s),),
+    if not scenario.bays:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r}: no structure has a facade with bays: add "
+            "[structures.facade]"
+        )
+    if not engine.has_peaks:
+        raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
+    if not engine.is_complete:
+        raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
+
+
+def consequences_of(blasts: Blasts, name: str | None = None) -> Consequences:
+    """Return the consequences of blasts for the buildings and the barrier.
+
+    They are those with the layout in question, unless another one is named. The present panes and
+    walls stand in the bays, with the measures of the layout.
+
+    Raises:
+        BlastEnvError: If the engine records no bays, or a record is that of other bays.
+    """
+    name = name or blasts.judged
+    numbers = range(len(blasts.threats))
+    return Consequences.together(
+        response_to(
+            blasts.scenario, blasts.layouts[name], blasts.charge(name, k), blasts.records[name][k]
+        )
+        for k in numbers
     )
 
 
-def _unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
-    """Yield each building with doubtful loads, and the reasons.
-
-    The loads are outside the validated range of the engine or the response, or not known.
-    """
-    reasons: dict[str, dict[str, None]] = {}
-    for outline in result.run.site.structures:
-        if not outline.is_barrier:
-            name = scenario.building_names.get(outline.name, outline.name)
-            own = reasons.setdefault(name, {})
-            own.update(dict.fromkeys(result.impulse(outline.name).notes))
-            if result.run.site.scaled_distance(outline) < CHECKED_SCALED_DISTANCE[0]:
-                own[_BREACH] = None
-    yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
+def response_to(
+    scenario: Scenario, layout: Layout, charge: Charge, record: BlastRecord
+) -> Consequences:
+    """Return the consequences of one blast with the charge at its place; see `consequences_of`."""
+    details = record.complete
+    standing = tuple(each for each in load_relevant(layout) if each not in record.taken_away)
+    responses: list[BuildingResponse] = []
+    if record.bays:
+        bays = {each.bay.name: each for each in scenario.bays_with(layout)}
+        if not bays.keys() >= {*record.bays}:
+            raise BlastEnvError("the bays of the record are those of another facade")
+        facade = respond([bays[each] for each in record.bays], record.time_s, record.pressure_pa)
+        site = build_site(scenario, standing, 0, charge)
+        responses = by_building(scenario, facade, site, details.peak_factor, details.known)
+    assert record.pieces is not None
+    return Consequences(
+        tuple(responses),
+        tuple(neighbours_of(scenario, details.walls, charge)),
+        (BarrierResponse(charge, record.pieces, record.taken_away),),
+        details.unchecked,
+        details.unjudged,
+    )
 
 
 def by_building(
@@ -593,24 +584,25 @@ def side_on_impulse_pa_s(reflected_pa_s: FloatArray) -> FloatArray:
     return 0.5 * np.asarray(reflected_pa_s, dtype=np.float64)
 
 
-def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> list[Neighbour]:
-    """Return the damage of ordinary houses in place of the buildings without a facade."""
-    faces = result.on_walls
-    walls = faces[faces["face"].isin(WALLS)]
+def neighbours_of(
+    scenario: Scenario, walls: Mapping[str, WallLoad], charge: Charge
+) -> list[Neighbour]:
+    """Return the damage of ordinary houses in place of the buildings without a facade.
+
+    `walls` has the load on the most loaded wall of each building, by name.
+    """
     found = []
     for building, parts in buildings_of(scenario.structures).items():
-        if any(each.facade is not None for each in parts):
+        if building not in walls or any(each.facade is not None for each in parts):
             continue
-        own = walls[walls["structure"].isin([each.name for each in parts])]
-        if not len(own):
-            continue
-        impulses, peaks = (means_by_wall(own, each) for each in ("impulse_pa_s", "peak_pa"))
-        wall = str(impulses.idxmax())
-        peak = side_on_peak_pa(np.array([peaks[wall]]))
-        impulse = side_on_impulse_pa_s(np.array([impulses[wall]]))
+        load = walls[building]
+        peak = side_on_peak_pa(np.array([load.peak_pa]))
+        impulse = side_on_impulse_pa_s(np.array([load.impulse_pa_s]))
         probability = {
             damage: building_damage_probability(damage, peak, impulse).item()
             for damage in BuildingDamage
         }
-        found.append(Neighbour(building, charge, wall, peak.item(), impulse.item(), probability))
+        found.append(
+            Neighbour(building, charge, load.wall, peak.item(), impulse.item(), probability)
+        )
     return found

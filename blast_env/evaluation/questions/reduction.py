@@ -1,4 +1,4 @@
-"""Layouts compared with no barrier on the same threats: loads, reductions, tables and records.
+"""Layouts compared with no barrier on the same threats: loads, reductions, tables and plain data.
 
 A reduction is NaN where the load without a barrier is 0. A comparison of layouts is refused for a
 case in which no threat causes a load without a barrier (`check_something_arrives`).
@@ -14,20 +14,17 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_something_arrives
-from blast_env.evaluation.engines.contract import (
-    BlastLoads,
-    Engine,
-    StructureLoad,
-    on_buildings,
-)
-from blast_env.evaluation.grid_error import GridError, LoadOf
+from blast_env.evaluation.engines.contract import Engine
+from blast_env.evaluation.questions.grid_error import GridError, impulse_of
+from blast_env.evaluation.record import BlastLoads, BlastRecord, StructureLoad, on_buildings
 from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
 from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
 from blast_env.provenance import versions
-from blast_env.site import AnyScenario, Scenario, find_scenario
+from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -90,13 +87,17 @@ THREAT_COLUMNS: Final = (
 
 
 def _structure_row(
-    loads: Sequence[StructureLoad],
-    without: Sequence[StructureLoad],
-    error: GridError | None,
-    impulse_of: LoadOf,
+    blasts: Blasts, load_of: Callable[[BlastRecord], StructureLoad], error: GridError | None
 ) -> dict[str, object]:
+    """Return the row of one structure or building, whose load in a blast is given."""
+    sides = [[load_of(each) for each in own] for own in blasts.records.values()]
+    without, loads = sides[0], sides[-1]
     first, stood = loads[0], worst_standing(load.stood for load in loads)
-    impulses = [np.array([load.impulse_pa_s for load in each]) for each in (loads, without)]
+
+    def impulse_of(record: BlastRecord) -> float:
+        return load_of(record).impulse_pa_s
+
+    impulses = [np.array([load.impulse_pa_s for load in own]) for own in (loads, without)]
     reduction = reduction_estimate(*impulses)
     errors, of_reduction = (np.nan, np.nan), np.nan
     if error is not None:
@@ -114,10 +115,10 @@ def _structure_row(
         "standing": stood.standing.label,
         "reason": stood.reason,
     }
-    sides = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
-    for side, each, impulse, off in sides:
+    both = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
+    for side, own, impulse, off in both:
         mean_pa_s = float(impulse.mean())
-        peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
+        peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in own]
         row[f"{side}impulse_pa_s"] = mean_pa_s
         row[f"{side}impulse_error_pa_s"] = off * mean_pa_s
         row[f"{side}peak_pa"] = float(np.mean(peaks))
@@ -161,19 +162,16 @@ class ThreatOutcome:
     in_range: bool
 
     @classmethod
-    def of(
-        cls,
-        scenario: AnyScenario,
-        layout: Layout,
-        threat: LoadCase,
-        loads: BlastLoads,
-        unprotected: BlastLoads,
-    ) -> Self:
-        """Return the outcome of a threat from its loads with a layout and without a barrier."""
-        scenario = find_scenario(scenario)
-        charge, elsewhere = (threat.charge_against(scenario, each) for each in (layout, ()))
+    def of(cls, blasts: Blasts, number: int, objective: ObjectiveSection | None = None) -> Self:
+        """Return the outcome of one threat, by its number, with the layout in question.
+
+        Loads are those of an objective, that of the site unless given.
+        """
+        scenario, counts = blasts.scenario, objective or blasts.scenario.objective
+        charge, elsewhere = (blasts.charge(each, number) for each in _sides(blasts))
+        loads, unprotected = (blasts.records[each][number].loads for each in _sides(blasts))
         return cls(
-            threat=threat,
+            threat=blasts.threats[number],
             charge=charge,
             stand_off_m=stand_off_m(scenario.loaded_walls, charge.position_m),
             unprotected_stand_off_m=stand_off_m(scenario.loaded_walls, elsewhere.position_m),
@@ -181,8 +179,8 @@ class ThreatOutcome:
             unprotected_impulse_pa_s=unprotected.protected_impulse_pa_s,
             peak_pa=loads.protected_peak_pa,
             unprotected_peak_pa=unprotected.protected_peak_pa,
-            load=loads.load(scenario.objective),
-            unprotected_load=unprotected.load(scenario.objective),
+            load=loads.load(counts),
+            unprotected_load=unprotected.load(counts),
             in_range=loads.in_range,
         )
 
@@ -190,6 +188,11 @@ class ThreatOutcome:
     def reduction(self) -> float:
         """Relative reduction of the load; NaN if the load without a barrier is 0."""
         return reductions(self.load, self.unprotected_load).item()
+
+
+def _sides(blasts: Blasts) -> tuple[str, str]:
+    """Return the names of the layout in question and of no barrier."""
+    return blasts.judged, blasts.unprotected
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,50 +209,66 @@ class Evaluation:
     outcomes, tables and records are those of the first case.
 
     Attributes:
-        cases: The cases, all with the same number of threats.
-        layouts: One per case.
-        blasts: Loads with the layouts (cases, threats).
-        unprotected_blasts: Loads without a barrier (cases, threats).
-        engine: The engine.
+        every: The blasts of each case, with the layout last, all with the same number of threats.
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
-        grid_error: Error of the cells, from the threat with the largest load behind a layout;
-            `None` without one.
 
     Raises:
         BlastEnvError: If no load reaches the protected structures of a case without a barrier.
     """
 
-    cases: tuple[LoadCaseSet, ...]
-    layouts: tuple[Layout, ...]
-    blasts: tuple[tuple[BlastLoads, ...], ...]
-    unprotected_blasts: tuple[tuple[BlastLoads, ...], ...]
-    engine: Engine
+    every: tuple[Blasts, ...]
     cvar_level: float = CVAR_LEVEL
-    grid_error: GridError | None = None
 
     def __post_init__(self) -> None:
         check_cvar_level(self.cvar_level)
         check_something_arrives(self.cases, self.unprotected)
 
     @property
+    def cases(self) -> tuple[LoadCaseSet, ...]:
+        """The cases."""
+        return tuple(each.case for each in self.every)
+
+    @property
+    def layouts(self) -> tuple[Layout, ...]:
+        """The layout of each case."""
+        return tuple(each.layouts[each.judged] for each in self.every)
+
+    @property
+    def blasts(self) -> Blasts:
+        """The blasts of the first case."""
+        return self.every[0]
+
+    @property
+    def engine(self) -> Engine:
+        """The engine."""
+        return self.blasts.engine
+
+    @cached_property
+    def grid_error(self) -> GridError | None:
+        """Error of the cells, from the threat with the largest load; `None` without one."""
+        found = (GridError.of(each) for each in self.every)
+        return next((each for each in found if each is not None), None)
+
+    @property
     def _has_one_case(self) -> bool:
         """Whether there is a single case, so that intervals are over its threats."""
-        return len(self.cases) == 1
+        return len(self.every) == 1
 
     @cached_property
     def loads(self) -> FloatArray:
         """Loads on the protected structures in the unit of the objective (cases, threats)."""
-        return self._counted(self.blasts)
+        return np.array([each.loads(each.judged) for each in self.every])
 
     @cached_property
     def unprotected(self) -> FloatArray:
         """The same without a barrier (cases, threats)."""
-        return self._counted(self.unprotected_blasts)
+        return np.array([each.loads(each.unprotected) for each in self.every])
 
     @property
     def in_range(self) -> bool:
         """Whether all blasts are in the range of the calibration."""
-        return all(each.in_range for of_case in self.blasts for each in of_case)
+        own = (record for each in self.every for record in each.records[each.judged])
+        return all(each.loads.in_range for each in own)
 
     @property
     def _is_mean(self) -> bool:
@@ -297,7 +316,16 @@ class Evaluation:
     @property
     def reduction_error(self) -> float:
         """Error of the cells of the reduction, as under the worst threat; NaN without one."""
-        return np.nan if self.grid_error is None else self.grid_error.reduction
+        if self.grid_error is None:
+            return np.nan
+        own = next(each for each in self.every if each.coarse is not None)
+
+        def value_of(record: BlastRecord, layout: Layout = ()) -> float:
+            return own.case.objective_value([own.objective_of(record)], layout)
+
+        return self.grid_error.of_reduction(
+            partial(value_of, layout=self.grid_error.layout), value_of
+        )
 
     @property
     def objective_error(self) -> float:
@@ -305,7 +333,9 @@ class Evaluation:
 
         def share(error: GridError) -> float:
             return error.of_load(
-                lambda each: self.case.objective_value([error.objective(each)], self.layout)
+                lambda each: self.case.objective_value(
+                    [self.blasts.objective_of(each)], self.layout
+                )
             )
 
         return self._error(self.load, share)
@@ -313,13 +343,13 @@ class Evaluation:
     @property
     def mean_error(self) -> float:
         """Error of the cells of `mean`, the share as under the worst threat; NaN without one."""
-        return self._error(self.mean.value, lambda error: error.of_load(error.objective))
+        return self._error(self.mean.value, lambda error: error.of_load(self.blasts.objective_of))
 
     @property
     def unprotected_mean_error(self) -> float:
         """The same without a barrier."""
         mean = self.unprotected_mean.value
-        return self._error(mean, lambda error: error.of_unprotected(error.objective))
+        return self._error(mean, lambda error: error.of_unprotected(self.blasts.objective_of))
 
     def _error(self, value: float, share: Callable[[GridError], float]) -> float:
         return np.nan if self.grid_error is None else share(self.grid_error) * value
@@ -338,12 +368,6 @@ class Evaluation:
         """Return the objective values of layouts in each case (cases,)."""
         rows = zip(self.cases, loads, layouts, strict=True)
         return np.array([case.objective_value(row, layout) for case, row, layout in rows])
-
-    def _counted(self, blasts: Sequence[Sequence[BlastLoads]]) -> FloatArray:
-        rows = zip(self.cases, blasts, strict=True)
-        return np.array(
-            [[each.load(case.scenario.objective) for each in own] for case, own in rows]
-        )
 
     @property
     def case(self) -> LoadCaseSet:
@@ -374,8 +398,7 @@ class Evaluation:
     @cached_property
     def outcomes(self) -> tuple[ThreatOutcome, ...]:
         """The loads under each threat."""
-        of = partial(ThreatOutcome.of, self.scenario, self.layout)
-        return tuple(map(of, self.threats, self.blasts[0], self.unprotected_blasts[0]))
+        return tuple(ThreatOutcome.of(self.blasts, k) for k in range(len(self.threats)))
 
     @property
     def load(self) -> float:
@@ -400,17 +423,17 @@ class Evaluation:
     @property
     def impulse_pa_s(self) -> Estimate:
         """Mean impulse with the barrier, Pa*s, for any objective."""
-        return mean_estimate(_impulses_pa_s(self.blasts[0]))
+        return mean_estimate(self.blasts.values(self.blasts.judged, impulse_of))
 
     @property
     def unprotected_impulse_pa_s(self) -> Estimate:
         """Mean impulse without the barrier, Pa*s."""
-        return mean_estimate(_impulses_pa_s(self.unprotected_blasts[0]))
+        return mean_estimate(self.blasts.values(self.blasts.unprotected, impulse_of))
 
     @cached_property
     def worst(self) -> ThreatOutcome:
-        """The threat with the largest load behind the barrier."""
-        return max(self.outcomes, key=lambda outcome: outcome.load)
+        """The threat that governs with the barrier; see `Blasts.worst`."""
+        return self.outcomes[self.blasts.worst()]
 
     @cached_property
     def table(self) -> "pd.DataFrame":
@@ -428,17 +451,14 @@ class Evaluation:
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
         """Return one row per load in the result of `loads_of`."""
-        loads, without = (
-            zip(*map(loads_of, blasts), strict=True)
-            for blasts in (self.blasts[0], self.unprotected_blasts[0])
-        )
 
-        def impulse_of(blast: BlastLoads, number: int) -> float:
-            return loads_of(blast)[number].impulse_pa_s
+        def load_of(record: BlastRecord, number: int) -> StructureLoad:
+            return loads_of(record.loads)[number]
 
+        count = len(loads_of(self.blasts.records[self.blasts.judged][0].loads))
         rows = [
-            _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
-            for number, both in enumerate(zip(loads, without, strict=True))
+            _structure_row(self.blasts, partial(load_of, number=number), self.grid_error)
+            for number in range(count)
         ]
         return table_of(rows, STRUCTURE_COLUMNS)
 
@@ -456,10 +476,11 @@ class Evaluation:
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
         impulse, without = (
-            np.mean([load.module_impulse for load in loads], axis=0)
-            for loads in (self.blasts[0], self.unprotected_blasts[0])
+            np.mean([each.loads.module_impulse for each in self.blasts.records[side]], axis=0)
+            for side in _sides(self.blasts)
         )
-        name = "impulse_sim" if self.blasts[0][0].has_particles else "impulse_n_s"
+        first = self.blasts.records[self.blasts.judged][0].loads
+        name = "impulse_sim" if first.has_particles else "impulse_n_s"
         values = {
             name: impulse,
             f"unprotected_{name}": without,
@@ -484,9 +505,10 @@ class Evaluation:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [*self.engine.caveats(self.scenario)]
         checked = self.engine.validated_range
+        own = (each.loads.structures for each in self.blasts.records[self.blasts.judged])
         if self.engine.needs_calibration:
             checked = f"the range of calibration {self.calibration!r}"
-        for of_structure in zip(*(load.structures for load in self.blasts[0]), strict=True):
+        for of_structure in zip(*own, strict=True):
             outside = [load for load in of_structure if not load.in_range]
             if outside:
                 notes.append(
@@ -556,10 +578,6 @@ class Evaluation:
 
 SCHEMA_VERSION: Final = 3
 """Version of the file written by `Evaluation.to_json`."""
-
-
-def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
-    return np.array([load.protected_impulse_pa_s for load in loads])
 
 
 def estimate_record(estimate: Estimate) -> dict[str, float | None]:

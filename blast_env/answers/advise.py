@@ -1,0 +1,89 @@
+"""The answer of `advise`: the cost to pass, flags, errors, and the table of kinds of measures."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from blast_env.answers.assess import impulse_lines
+from blast_env.answers.document import AnyPart, Line, Table, lines, percent
+from blast_env.design.search.advice import Advice, MeasureKind
+from blast_env.design.search.advised import AdviceResult
+from blast_env.evaluation.questions.probability import DRAWS, probability_text
+from blast_env.evaluation.questions.verdict import Verdict
+from blast_env.geometry import layout_words
+from blast_env.layout import LayoutState
+from blast_env.layout.placement import load_relevant
+
+_HEADERS: Final = (
+    *("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks"),
+    "probability",
+)
+
+
+def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
+    """Yield the cost to pass, flags, the error of the cells, and the table of the kinds."""
+    judge, best = found.judge, found.best
+    scenario, target = judge.scenario, judge.target
+    yield Line.of(_first_line(found, best), kind="answer")
+    yield from lines((f"flag: {note}" for note in judge.judged[best.layout].notes), "flag")
+    error = judge.error(best.layout)
+    if error is not None:
+        yield from impulse_lines(error)
+    rows = []
+    for each in found.found:
+        seen = judge.judged[each.layout]
+        rows.append(
+            (
+                str(each.kind),
+                layout_words(each.layout),
+                f"{LayoutState(scenario, each.layout).cost:,.10g}",
+                str(each.blasts),
+                min(seen.level(building) for building in seen.buildings).label,
+                "yes" if each.passes else "no",
+                Verdict.of(seen.passes_on_cells(target)).word(seen.is_flagged).lower(),
+                seen.verdict_word(target).lower(),
+                probability_text(judge.shares[each.layout], DRAWS),
+            )
+        )
+    zone = scenario.zone
+    budget = "no limit" if zone.budget is None else zone.priced(zone.budget)
+    title = f"{scenario.name}: budget {budget}, required level {target.label!r}"
+    yield Table.of(title, _HEADERS, rows, 2)
+    yield Line.of(
+        f"passes: by the search; judged: {judge.engine.words}; level, sharp peaks: the same "
+        "impulses with peaks that cells do not clip as well; probability: of the required "
+        "level.",
+        kind="quiet",
+    )
+
+
+def _first_line(found: AdviceResult, best: Advice) -> str:
+    """Return the answer in a line or two: the cost to pass, and whether walls help."""
+    judge = found.judge
+    scenario, target = judge.scenario, judge.target
+    by_kind = {each.kind: each for each in found.found}
+    flagged = " (flagged)" if judge.judged[best.layout].is_flagged else ""
+    wanted = scenario.objective.target_probability
+    likely = probability_text(judge.shares[best.layout], DRAWS)
+    if judge.verdict(best.layout) is not Verdict.PASSES:
+        least = (
+            "" if wanted is None else f" with a probability of {wanted:g}; the best has {likely}"
+        )
+        answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}{least}."
+    elif not best.layout:
+        answer = f"{scenario.name}: the empty site reaches {target.label!r} with {likely}{flagged}."
+    else:
+        words = layout_words(best.layout)
+        price = scenario.zone.priced(LayoutState(scenario, best.layout).cost)
+        answer = f"{scenario.name}: {target.label!r} with {likely} costs {price}{flagged}: {words}."
+    shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
+    if shield is None or judge.judged[shield.layout].passes(target):
+        return answer
+    gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0
+    if best.passes and not load_relevant(best.layout):
+        return f"Walls are worth nothing here: better components alone are cheaper. {answer}"
+    if gain < 0.01:
+        return (
+            "Walls alone are worth nothing here: they change the shortfall by "
+            f"{percent(gain)}. {answer}"
+        )
+    return answer

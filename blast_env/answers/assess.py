@@ -1,0 +1,307 @@
+"""The answers of `assess`: the verdict and what it rests on, capacity, screening, barriers."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import nan
+from typing import Final
+
+import numpy as np
+
+from blast_env.answers.document import (
+    AnyCell,
+    AnyPart,
+    Line,
+    Number,
+    Table,
+    building_words,
+    charge_text,
+    lines,
+)
+from blast_env.answers.pieces import pieces_answer
+from blast_env.evaluation.blasts import Blasts, NumberOf
+from blast_env.evaluation.questions.capacity import LEVELS, Edge, PlaceCapacity
+from blast_env.evaluation.questions.grid_error import (
+    FACTOR,
+    ORDER,
+    GridError,
+    convergence_index,
+    impulse_of,
+)
+from blast_env.evaluation.questions.probability import Uncertainty, level_probability
+from blast_env.evaluation.questions.verdict import (
+    Consequences,
+    Verdict,
+    consequences_of,
+    other_glazing,
+    side_on_peak_pa,
+)
+from blast_env.evaluation.record import BlastRecord
+from blast_env.response.buildings import BuildingDamage, LevelOfProtection
+from blast_env.response.requirements import Requirement
+from blast_env.site import Scenario
+from blast_env.statistics import reductions
+from blast_env.values import count_of
+
+RESPONSE_HEADERS: Final = (
+    *("building", "level of protection", "panes broken", "worst pane (GSA, ISO)", "worst panel"),
+)
+_NEIGHBOURS: Final = (
+    *("layout", "building", "side-on peak (kPa)", "side-on impulse (Pa s)"),
+    *(f"{damage} (%)" for damage in BuildingDamage),
+)
+
+
+def governing(blasts: Blasts) -> int:
+    """Return the number of the charge with the governing response behind the layout."""
+    return consequences_of(blasts).worst_number
+
+
+@dataclass(frozen=True, eq=False)
+class Assessed:
+    """The consequences of blasts with each layout, and their errors of the cells.
+
+    Attributes:
+        blasts: The blasts, on coarser cells under the charge that governs.
+    """
+
+    blasts: Blasts
+
+    @cached_property
+    def found(self) -> dict[str, Consequences]:
+        """The consequences with each layout, no barrier first."""
+        return {name: consequences_of(self.blasts, name) for name in self.blasts.layouts}
+
+    @cached_property
+    def coarse(self) -> dict[str, Consequences]:
+        """The same under the charge that governs, on coarser cells; empty without these."""
+        coarse = self.blasts.coarse
+        if coarse is None:
+            return {}
+        return {name: consequences_of(coarse, name) for name in coarse.layouts}
+
+    @property
+    def judged(self) -> Consequences:
+        """The consequences with the layout in question."""
+        return self.found[self.blasts.judged]
+
+
+def assessment(
+    blasts: Blasts,
+    target: LevelOfProtection,
+    mass_error: float,
+    required: Sequence[Requirement] = (),
+) -> Iterator[AnyPart]:
+    """Yield the verdict and what it rests on.
+
+    Args:
+        blasts: The blasts, on coarser cells under the charge that governs.
+        target: Required level of protection.
+        mass_error: Uncertainty of the masses; see `Uncertainty`.
+        required: Further requirements.
+    """
+    assessed, scenario = Assessed(blasts), blasts.scenario
+    yield from _verdict(assessed, target)
+    judged_first = [*assessed.found.items()][::-1]
+    for requirement in required:
+        for name, found in judged_first:
+            kept = all(requirement.kept_by(each.facade) for each in found.responses)
+            word = Verdict.of(kept).word(found.is_flagged).lower()
+            yield Line.of(f"{requirement.words}, {name}: {word}")
+    error = GridError.of(blasts)
+    uncertainty = Uncertainty.of(mass_error, error)
+    for name, found in judged_first:
+        likely = level_probability(found, uncertainty)
+        yield Line.of(f"probability, {name}: {likely.words(target)}")
+    if error is not None:
+        yield from impulse_lines(error)
+        yield from lines(_levels_changed(assessed))
+    yield _buildings(assessed)
+    for name, found in [*assessed.found.items()][:-1]:
+        yield from lines((f"flag, {name}: {note}" for note in found.notes), "flag")
+    yield from _neighbours(assessed)
+    worst = assessed.judged.worst_barrier
+    if worst is not None:
+        title = f"the barrier under {charge_text(worst.charge)}, the worst"
+        yield from pieces_answer(worst.pieces, title)
+    for barrier in assessed.judged.barriers:
+        if barrier.taken_away:
+            yield Line.of(
+                f"{len(barrier.taken_away)} pieces overturned before the blast of "
+                f"{charge_text(barrier.charge)} was over, and were taken away for it"
+            )
+    yield _glazing(scenario, assessed.judged, target)
+
+
+def _verdict(assessed: Assessed, target: LevelOfProtection) -> Iterator[AnyPart]:
+    judged, blasts = assessed.judged, assessed.blasts
+    verdict, level = judged.verdict_word(target), judged.level_words_for(target)
+    charges = count_of("charge", len(judged.barriers))
+    words = f"{blasts.scenario.name}, {blasts.judged}: {verdict}: {level}, under {charges}"
+    yield Line.of(words, kind="answer")
+    for building in judged.buildings:
+        stood = judged.standing(building).words
+        yield Line.of(f"standing of the load that decides, {building}: {stood}")
+    yield from lines((f"flag: {note}" for note in judged.notes), "flag")
+    if doubt := judged.doubt(target):
+        yield Line.of(doubt)
+    yield Line.of(judged.force_words)
+
+
+def cells_words(error: GridError) -> str:
+    """Return the coarse cells and the formula of an error, for a line below a result."""
+    return (
+        f"(cells): grid convergence index against {error.coarser.words}, under the worst charge"
+        f" (factor {FACTOR:g}, order {ORDER:g})"
+    )
+
+
+def impulse_lines(error: GridError) -> Iterator[Line]:
+    """Yield the impulse on the protected structures under the worst charge, and its error."""
+    words = "impulse on the protected structures under the worst charge: "
+    protected, unprotected = (
+        Number(impulse_of(record), "Pa s", share * impulse_of(record))
+        for record, share in zip(
+            error.fine,
+            (error.of_load(impulse_of), error.of_unprotected(impulse_of)),
+            strict=True,
+        )
+    )
+    if not error.layout:
+        yield Line.of(words, protected)
+    else:
+        gone = reductions(*map(impulse_of, error.fine)).item()
+        share = Number.reduction(gone, error.of_reduction(impulse_of))
+        sides = unprotected, " without barrier, ", protected, " with, reduction "
+        yield Line.of(words, *sides, share)
+    yield Line.of(cells_words(error), kind="quiet")
+
+
+def _levels_changed(assessed: Assessed) -> Iterator[str]:
+    """Yield levels that cells change under the worst charge."""
+    judged, coarse = assessed.judged, assessed.blasts.coarse
+    if coarse is None:
+        return
+    for building in judged.buildings:
+        fine = judged.of(building)[_coarse_number(assessed.blasts)].facade.level_of_protection
+        other = assessed.coarse[assessed.blasts.judged].level(building)
+        if other != fine:
+            yield (
+                f"note: {building} reaches level {other.label!r} with {coarse.engine.words}, "
+                f"and {fine.label!r} with the finer cells, under the worst charge"
+            )
+
+
+def _coarse_number(blasts: Blasts) -> int:
+    """Return the number of the charge that has coarser cells as well."""
+    assert blasts.coarse is not None
+    return blasts.threats.index(blasts.coarse.threats[0])
+
+
+def response_cells(
+    found: Consequences, building: str, coarse: Consequences | None = None, number: int = 0
+) -> tuple[AnyCell, ...]:
+    """Return the response of a building; of the panes with the error of the cells.
+
+    `coarse` has the response on coarser cells to the charge of a number.
+    """
+    whole = found.summary(building)
+    error = nan
+    if coarse is not None:
+        fine = found.of(building)[number].facade.broken_panes
+        error = convergence_index(fine, coarse.of(building)[0].facade.broken_panes)
+    panes = Number(whole.broken, error=error, digits=1, flag=f" of {whole.panes}")
+    return whole.level, panes, whole.condition, whole.damage
+
+
+def _buildings(assessed: Assessed) -> Table:
+    blasts = assessed.blasts
+    number = 0 if blasts.coarse is None else _coarse_number(blasts)
+    rows = [
+        (
+            name,
+            building_words(blasts.scenario, building),
+            *response_cells(found, building, assessed.coarse.get(name), number),
+        )
+        for name, found in assessed.found.items()
+        for building in found.buildings
+    ]
+    title = f"{blasts.scenario.name}: the worst of all charges"
+    return Table.of(title, ("layout", *RESPONSE_HEADERS), rows, 3)
+
+
+def _neighbours(assessed: Assessed) -> Iterator[AnyPart]:
+    blasts, rows = assessed.blasts, list[tuple[AnyCell, ...]]()
+    for name, found in assessed.found.items():
+        error = GridError.of(blasts, name)
+        for worst in found.worst_neighbours:
+
+            def peak_of(record: BlastRecord, building: str = worst.building) -> float:
+                return side_on_peak_pa(np.array([record.complete.walls[building].peak_pa])).item()
+
+            def reflected_of(record: BlastRecord, building: str = worst.building) -> float:
+                return record.complete.walls[building].impulse_pa_s
+
+            rows.append(
+                (
+                    name,
+                    building_words(blasts.scenario, worst.building),
+                    Number.kpa(worst.peak_pa, _off(error, peak_of) * worst.peak_pa),
+                    Number(
+                        worst.impulse_pa_s, error=_off(error, reflected_of) * worst.impulse_pa_s
+                    ),
+                    *(f"{100.0 * worst.probability[each]:.0f}" for each in BuildingDamage),
+                )
+            )
+    if rows:
+        title = "without a facade: how likely an ordinary house there is damaged, worst charge"
+        yield Table.of(title, _NEIGHBOURS, rows, 2)
+
+
+def _off(error: GridError | None, number_of: NumberOf) -> float:
+    return nan if error is None else error.of_load(number_of)
+
+
+def _glazing(scenario: Scenario, judged: Consequences, target: LevelOfProtection) -> Table:
+    rows = []
+    for name, glazing in other_glazing(scenario).items():
+        other = judged.with_glazing(glazing)
+        for building in other.buildings:
+            passes = Verdict.of(other.level(building) >= target).word(other.is_flagged)
+            words = building_words(scenario, building)
+            rows.append((name, words, *response_cells(other, building), passes.lower()))
+    headers = ("glass in all windows", *RESPONSE_HEADERS, "verdict")
+    return Table.of("the same loads, other glass", headers, rows, 3)
+
+
+def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Iterator[AnyPart]:
+    """Yield the largest masses and the least stand-offs, one row per layout and place."""
+    masses, stand_offs = list[tuple[str, ...]](), list[tuple[str, ...]]()
+    for each in found:
+        x_m, y_m = each.charge.position_m
+        place = each.layout, f"{x_m:.1f}, {y_m:.1f}"
+        masses.append((*place, f"{each.stand_off_m:.1f} m", *map(_mass_text, each.heavier)))
+        mass = f"{each.charge.tnt_kg:g} kg"
+        stand_offs.append((*place, mass, *map(_stand_off_text, each.nearer)))
+    blasts = sum(each.blasts for each in found)
+    yield Line.of(f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass")
+    keeps = "that keeps each level of protection"
+    levels = [each.label for each in LEVELS]
+    for title, third, rows in (
+        ("largest charge (kg TNT)", "stand-off", masses),
+        ("least stand-off (m)", "charge", stand_offs),
+    ):
+        headers = ("layout", "place (m)", third, *levels)
+        yield Table.of(f"{scenario.name}: {title} {keeps}", headers, rows, 2)
+
+
+def _mass_text(edge: Edge) -> str:
+    """Return the mass in kg, with the sign of a bound at an end of the ladder."""
+    sign = (">= " if edge.is_kept else "< ") if edge.is_end else ""
+    return f"{sign}{edge.charge.tnt_kg:.3g}"
+
+
+def _stand_off_text(edge: Edge) -> str:
+    """Return the stand-off in m, with the sign of a bound at an end of the ladder."""
+    sign = ("<= " if edge.is_kept else "> ") if edge.is_end else ""
+    return f"{sign}{edge.stand_off_m:.1f}"

@@ -1,0 +1,309 @@
+"""Documents: sections, lines, tables and pictures, with numbers that carry unit, error and flag.
+
+A number has one format everywhere (`Number`). Renderers choose only its signs: plain letters for
+the terminal, typographic ones for pages.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import floor, isfinite, isnan, log10, nan
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
+
+from pydantic import ConfigDict
+
+from blast_env.site import ObjectiveSection, Scenario
+from blast_env.site.blast_site import Charge
+from blast_env.statistics import Estimate
+from blast_env.units import MS_PER_S, PA_PER_KPA
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
+
+_FIGURES: Final = 3  # of a number
+_ERROR_FIGURES: Final = 2
+_PERCENT: Final = 100.0
+_SHOWN: Final = 0.0005  # the least share that is not printed as 0.0 %
+
+
+class Signs(NamedTuple):
+    """The signs of numbers.
+
+    Attributes:
+        plus_minus: Before an error.
+        minus: Before a negative number.
+        none: In the place of a number that is not known.
+    """
+
+    plus_minus: str
+    minus: str
+    none: str
+
+
+PLAIN: Final = Signs("+-", "-", "-")
+"""The signs of the terminal."""
+
+TYPOGRAPHIC: Final = Signs("\N{PLUS-MINUS SIGN}", "\N{MINUS SIGN}", "\N{EN DASH}")
+"""The signs of pages."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number as readers see it: `1,245 Pa s +- 12 (cells), +- 80 (95 %, charges)`.
+
+    It has three significant digits and all those before the point, or the given decimals; its error
+    two significant digits, or the same decimals.
+
+    Attributes:
+        value: The value; NaN for one that is not known.
+        unit: Its unit; empty where a header or a line has it.
+        error: Its grid error, in its unit; NaN without.
+        digits: Decimals of both; `None` for significant digits.
+        spread: Half of its 95 % interval over samples; NaN without.
+        sampled: What was sampled for that; with it, each error has its name beside it.
+        flag: Words after it.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(ser_json_inf_nan="constants")
+
+    value: float
+    unit: str = ""
+    error: float = nan
+    digits: int | None = None
+    spread: float = nan
+    sampled: str = ""
+    flag: str = ""
+
+    def text(self, signs: Signs = PLAIN) -> str:
+        """Return the number with its errors, its unit and its flag."""
+        if not isfinite(self.value):
+            return signs.none
+        errors = []
+        if isfinite(self.error):
+            named = " (cells)" if self.sampled else ""
+            errors.append(self._error(self.error, signs) + named)
+        if isfinite(self.spread):
+            errors.append(f"{self._error(self.spread, signs)} (95 %, {self.sampled})")
+        value = _digits(self.value, self.digits, _FIGURES).replace("-", signs.minus)
+        words = [f"{value} {self.unit}" if self.unit else value, ", ".join(errors)]
+        return " ".join(words).rstrip() + self.flag
+
+    def _error(self, error: float, signs: Signs) -> str:
+        return f"{signs.plus_minus} {_digits(error, self.digits, _ERROR_FIGURES)}"
+
+    @classmethod
+    def share(cls, share: float, error: float = nan, *, flag: str = "") -> Self:
+        """Return a share in per cent, with its error in percentage points."""
+        return cls(_PERCENT * share, "%", _PERCENT * error, 1, flag=flag)
+
+    @classmethod
+    def reduction(cls, share: float, error: float = nan) -> Self:
+        """Return a reduction in per cent; a negative one with words."""
+        return cls.share(share, error, flag=worse(share))
+
+    @classmethod
+    def kpa(cls, pressure_pa: float, error_pa: float = nan) -> Self:
+        """Return a pressure in kPa, as under a header with that unit."""
+        return cls(pressure_pa / PA_PER_KPA, error=error_pa / PA_PER_KPA)
+
+    @classmethod
+    def ms(cls, time_s: float) -> Self:
+        """Return a time in ms, as under a header with that unit."""
+        return cls(MS_PER_S * time_s)
+
+    @classmethod
+    def load(cls, objective: ObjectiveSection, load: float, error: float = nan) -> Self:
+        """Return a load in the unit of an objective."""
+        return cls(load, objective.unit, error)
+
+    def sampled_by(self, estimate: Estimate, samples: str, unit: float = 1.0) -> Self:
+        """Return the number with the interval of an estimate, and what it was sampled over.
+
+        `unit` is the unit of the number in that of the estimate.
+        """
+        return replace(self, spread=(estimate.value - estimate.low) / unit, sampled=samples)
+
+
+def _digits(value: float, digits: int | None, figures: int) -> str:
+    if digits is None:
+        digits = max(0, figures - 1 - floor(log10(abs(value)))) if value else 0
+    return f"{value:z,.{digits}f}"
+
+
+AnyCell: TypeAlias = str | Number
+"""What stands in a cell of a table."""
+
+
+Kind: TypeAlias = Literal["", "answer", "flag", "quiet", "item"]
+"""What a line is for: the answer, a flag that qualifies it, something quiet, an item of a list."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of text.
+
+    Attributes:
+        cells: Its texts and numbers, one after the other.
+        kind: What it is for.
+    """
+
+    cells: tuple[AnyCell, ...]
+    kind: Kind = ""
+
+    @classmethod
+    def of(cls, *cells: AnyCell, kind: Kind = "") -> Self:
+        """Return the line of some texts and numbers."""
+        return cls(cells, kind)
+
+    def text(self, signs: Signs = PLAIN) -> str:
+        """Return its text."""
+        return "".join(cell_text(each, signs) for each in self.cells)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        title: Its title.
+        headers: The headers.
+        rows: The rows: texts and numbers.
+        texts: Number of leading text columns; the others are aligned to the right.
+        after: Number of text columns at the end.
+    """
+
+    title: str
+    headers: tuple[str, ...]
+    rows: tuple[tuple[AnyCell, ...], ...]
+    texts: int = 1
+    after: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        headers: Sequence[str],
+        rows: Iterable[Sequence[AnyCell]],
+        texts: int = 1,
+        after: int = 0,
+    ) -> Self:
+        """Return the table of some rows."""
+        return cls(title, (*headers,), tuple(map(tuple, rows)), texts, after)
+
+    def cells(self, signs: Signs = PLAIN) -> list[tuple[str, ...]]:
+        """Return the rows as texts."""
+        return [tuple(cell_text(each, signs) for each in row) for row in self.rows]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture.
+
+    Attributes:
+        caption: Its caption.
+        png: The picture as PNG.
+    """
+
+    caption: str
+    png: bytes
+
+
+AnyPart: TypeAlias = Line | Table | Picture
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section: a title and parts.
+
+    Attributes:
+        title: Its title; empty for parts that need none.
+        parts: Lines, tables and pictures.
+    """
+
+    title: str
+    parts: tuple[AnyPart, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document.
+
+    Attributes:
+        sections: Its sections.
+    """
+
+    sections: tuple[Section, ...]
+
+    @classmethod
+    def of(cls, parts: Iterable[AnyPart], title: str = "") -> Self:
+        """Return a document of one section."""
+        return cls((Section(title, tuple(parts)),))
+
+    @property
+    def parts(self) -> Iterator[AnyPart]:
+        """All parts in their order."""
+        for section in self.sections:
+            yield from section.parts
+
+    @property
+    def first(self) -> str:
+        """The text of the first line."""
+        return next(each.text() for each in self.parts if isinstance(each, Line))
+
+
+def cell_text(cell: AnyCell, signs: Signs = PLAIN) -> str:
+    """Return the text of a cell."""
+    return cell if isinstance(cell, str) else cell.text(signs)
+
+
+def lines(texts: Iterable[str], kind: Kind = "") -> Iterator[Line]:
+    """Yield lines of texts."""
+    yield from (Line((each,), kind) for each in texts)
+
+
+# Words that several answers share.
+
+
+def building_words(scenario: Scenario, name: str) -> str:
+    """Return the name of a building, with its title if that says more."""
+    return titled(name, scenario.title_of(name))
+
+
+def titled(name: str, title: str) -> str:
+    """Return a name, with its title if that says more."""
+    return name if "_".join(title.split()) in ("", name) else f"{name}: {title}"
+
+
+def charge_text(charge: Charge) -> str:
+    """Return a charge in words: `100 kg at (2, 4) m`."""
+    x_m, y_m = charge.position_m
+    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
+
+
+def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
+    """Yield the standing of the load on each building, with its reason.
+
+    Args:
+        scenario: It has the titles of the buildings.
+        buildings: A table with `STANDING_COLUMNS`.
+        column: The column with the name of the building.
+    """
+    for each in buildings.to_dict("records"):
+        name = building_words(scenario, str(each[column]))
+        yield f"standing of the load, {name}: {each['standing']} ({each['reason']})"
+
+
+def worse(reduction: float) -> str:
+    """Return words on a negative reduction, in brackets; empty for any other."""
+    return " (the barrier makes it worse)" if reduction <= -_SHOWN else ""
+
+
+def interval(estimate: Estimate) -> str:
+    """Return an interval of shares in words; a dash for a single threat."""
+    if isnan(estimate.low):
+        return PLAIN.none
+    return f"{percent(estimate.low)} to {percent(estimate.high)}"
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, for lines of plain text; a dash for NaN."""
+    return Number.share(share).text()

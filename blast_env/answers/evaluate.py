@@ -1,0 +1,134 @@
+"""The answer of `evaluate`: mean loads of buildings and the effect of a layout over all threats."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from blast_env.answers.assess import cells_words
+from blast_env.answers.document import (
+    TYPOGRAPHIC,
+    AnyPart,
+    Line,
+    Number,
+    Table,
+    building_words,
+    interval,
+    lines,
+    standing_lines,
+)
+from blast_env.evaluation.cases import are_all, fixed_charges
+from blast_env.evaluation.questions.reduction import Evaluation
+from blast_env.geometry import layout_counts
+from blast_env.site import ObjectiveSection
+from blast_env.statistics import Estimate
+
+_HEADERS: Final = (
+    *("building", "protected", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
+    *("threats in range", "standing"),
+)
+
+
+def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPart]:
+    """Yield the buildings' mean loads, the totals, the worst threat, and notes.
+
+    `seeds` drew the threats.
+    """
+    scenario, buildings = found.scenario, found.building_table
+    count = len(found.threats)
+    barriers = layout_counts(found.layout, "barrier")
+    title = f"{scenario.name}: {barriers} against none, {_threats_text(count, seeds)}"
+    rows = [_row(found, row) for row in buildings.to_dict("records")]
+    yield Table.of(title, _HEADERS, rows, 2, 1)
+    yield from lines(standing_lines(scenario, buildings, "structure"))
+    sampled = "threats" if found.engine.has_noise else "charges"
+    yield from means(found, scenario.objective, sampled)
+    yield from _objective(found)
+    worst = found.worst
+    yield Line.of(
+        f"worst threat: {worst.charge.tnt_kg:g} kg TNT at ({worst.charge.position_m[0]:.2f}, "
+        f"{worst.charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: ",
+        Number.load(scenario.objective, worst.load),
+        ", reduction ",
+        Number.reduction(worst.reduction),
+    )
+    is_scaled = found.engine.needs_calibration
+    law = f"calibration {found.calibration}, " if is_scaled else ""
+    yield Line.of(f"{law}scenario hash {scenario.content_hash[:12]}", kind="quiet")
+    fixed = len(fixed_charges(scenario))
+    if fixed > 1 and are_all(scenario, [each.charge for each in found.threats]):
+        yield Line.of(
+            f"note: the site has {fixed} fixed charges, which all count here; the interval is "
+            "their spread, not an uncertainty about others"
+        )
+    yield from lines((f"note: {note}" for note in found.notes), "flag")
+
+
+def evaluation_title(found: Evaluation) -> str:
+    """Return the title of the figure of an evaluation: the reduction and its errors."""
+    barrier = layout_counts(found.layout, "barrier") if found.layout else "no barrier"
+    share = Number.share(found.mean_reduction, found.reduction_error)
+    own = f" (95 %: {interval(found.reduction)})" if len(found.threats) > 1 else ""
+    noun = found.scenario.objective.noun
+    return (
+        f"{found.scenario.name}, {barrier}: reduction of the {noun} {share.text(TYPOGRAPHIC)}{own}"
+    )
+
+
+def _threats_text(count: int, seeds: Sequence[int]) -> str:
+    """Return the threats of the means in words."""
+    if count == 1:
+        return f"seed {seeds[0]}"
+    return f"means over {count} threats (seeds {seeds[0]} to {seeds[-1]})"
+
+
+def _row(found: Evaluation, row: dict[Any, Any]) -> tuple[str | Number, ...]:
+    reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
+    return (
+        building_words(found.scenario, str(row["structure"])),
+        "yes" if row["protected"] else "no",
+        Number(row["unprotected_impulse_pa_s"], error=row["unprotected_impulse_error_pa_s"]),
+        Number(row["impulse_pa_s"], error=row["impulse_error_pa_s"]),
+        Number.share(reduction.value, row["reduction_error"]),
+        interval(reduction),
+        f"{row['threats_in_range']} of {len(found.threats)}",
+        row["standing"],
+    )
+
+
+def _objective(found: Evaluation) -> Iterator[Line]:
+    objective = found.scenario.objective
+    if objective == ObjectiveSection():
+        return
+    over = {"mean": "mean over", "cvar": "mean of the worst", "worst": "worst of"}
+    noun = "impulse and peak" if objective.quantity == "both" else objective.noun
+    yield Line.of(
+        f"objective ({noun}, {over[objective.charges]} the charges): ",
+        Number.load(objective, found.unprotected_load),
+        " without barrier, ",
+        Number.load(objective, found.load, found.objective_error),
+        " with",
+    )
+
+
+def means(
+    found: Evaluation, objective: ObjectiveSection, sampled: str = "charges"
+) -> Iterator[Line]:
+    """Yield the reduction, the mean loads without and with barrier, and what their errors are."""
+    share = Number.reduction(found.reduction.value, found.reduction_error)
+    yield Line.of(
+        "protected structures, by weight: mean reduction ",
+        share.sampled_by(found.reduction, sampled, 0.01),
+    )
+    worst = f"mean of the worst {100.0 * (1.0 - found.cvar_level):.3g} % "
+    for words, load, error, cvar in (
+        (
+            "without barrier",
+            found.unprotected_mean,
+            found.unprotected_mean_error,
+            found.unprotected_cvar,
+        ),
+        ("with barrier", found.mean, found.mean_error, found.cvar),
+    ):
+        number = Number.load(objective, load.value, error).sampled_by(load, sampled)
+        yield Line.of(f"{words}: mean ", number, f", {worst}", Number.load(objective, cvar))
+    if found.grid_error is not None:
+        yield Line.of(cells_words(found.grid_error), kind="quiet")

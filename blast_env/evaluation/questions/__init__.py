@@ -1,0 +1,1 @@
+"""Questions to blasts: reduction, verdict, grid error, probability, capacity, screening."""

@@ -1,0 +1,536 @@
+"""The record of a blast: the numbers that every question is answered from, its key, its codec.
+
+Every engine gives loads. Gas dynamics adds the loads on buildings and walls, the histories of the
+bays of facades, and the movements of barrier pieces: a complete record. The record stores; whether
+a level is reached, or how likely a house is damaged, is a question
+(`blast_env.evaluation.questions`).
+"""
+
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, TypeAdapter
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.standing import UNSTATED, ReasonedStanding, worst_standing
+from blast_env.geometry import Layout, WallName
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.damage import BayDamage, level_of, worst
+from blast_env.site import AnyScenario, ObjectiveSection, Scenario, find_scenario
+from blast_env.site.blast_site import Charge
+from blast_env.site.facade import NamedBay
+from blast_env.site.structures import StructureSection
+from blast_env.statistics import counted_parts, mean_over_area
+
+if TYPE_CHECKING:  # pandas takes a third of a second to import
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class StructureLoad:
+    """The load on one structure.
+
+    Attributes:
+        name: Name of the structure.
+        protected: Whether its load counts.
+        weight: Its weight among the protected structures.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
+            dynamics the peak specific impulse, averaged over the counted walls.
+        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
+        peak_weight: Weight of the peak among the protected structures.
+        in_range: Whether this distance and charge lie in the range of the calibration.
+        notes: Reasons if they do not, one sentence each.
+        building: The building that it is part of; its own name if it is a building by itself.
+        area_m2: Area of the counted walls; `None` where the engine has no areas.
+        response: Response of its bays in the objective; `None` unless the objective is a response.
+        worst_damage: The largest damage of its bays, for the same objective.
+        stood: Standing of the load, with its reason.
+        impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
+    """
+
+    name: str
+    protected: bool
+    weight: float
+    impulse_pa_s: float
+    peak_pa: float | None
+    peak_weight: float
+    in_range: bool
+    notes: tuple[str, ...]
+    building: str
+    area_m2: float | None = None
+    response: float | None = None
+    worst_damage: float | None = None
+    stood: ReasonedStanding = UNSTATED
+    impulse_sim: float | None = None
+
+    @classmethod
+    def on(
+        cls,
+        structure: StructureSection,
+        impulse_pa_s: float,
+        peak_pa: float | None = None,
+        in_range: bool = False,
+        **others: Any,
+    ) -> Self:
+        """Return the load on a structure of a scenario; `others` are further attributes."""
+        return cls(
+            name=structure.name,
+            protected=structure.protected,
+            weight=structure.weight,
+            impulse_pa_s=impulse_pa_s,
+            peak_pa=peak_pa,
+            peak_weight=structure.counted_peak_weight,
+            in_range=in_range,
+            building=structure.building_name,
+            **({"notes": ()} | others),
+        )
+
+
+def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
+    """Combine the loads on structures into loads on buildings.
+
+    Impulses are means over the area of the counted walls. Where the engine has no areas, the
+    weights of the structures replace them.
+    """
+    parts: dict[str, list[StructureLoad]] = {}
+    for load in loads:
+        parts.setdefault(load.building, []).append(load)
+    found = []
+    for name, own in parts.items():
+        if len(own) > 1:
+            found.append(_on_building(name, own))
+        else:
+            found.append(own[0] if own[0].name == name else replace(own[0], name=name))
+    return tuple(found)
+
+
+def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
+    counted = counted_parts(parts)
+    areas_m2 = [each.area_m2 for each in counted if each.area_m2 is not None]
+    weights = [each.weight for each in counted]
+    is_known = len(areas_m2) == len(counted)
+    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
+    impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
+    hit = [each.impulse_sim for each in parts if each.impulse_sim is not None]
+    return replace(
+        counted[0],
+        name=name,
+        weight=sum(weights),
+        impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
+        peak_pa=max(peaks_pa, default=None),
+        in_range=all(each.in_range for each in counted),
+        area_m2=sum(areas_m2) if is_known else None,
+        stood=worst_standing(each.stood for each in counted),
+        impulse_sim=sum(hit) if hit else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BlastLoads:
+    """The loads of one blast on all structures, without the barrier.
+
+    Attributes:
+        structures: One load per structure, in the order of the scene.
+        module_impulse: Load on each module of the structures, in the order of the scene (modules,):
+            of particles the sum of m |v|, simulation units; of gas the momentum on its walls, N s.
+        bays: Damage of the bays of facades with each of their possible components; empty unless
+            the objective is a response.
+    """
+
+    structures: tuple[StructureLoad, ...]
+    module_impulse: NDArray[np.float64]
+    bays: tuple[BayDamage, ...] = ()
+
+    def with_facades(
+        self, named: Collection[NamedBay], objective: ObjectiveSection
+    ) -> "BlastLoads":
+        """Return the loads with the response of given facades, without another blast.
+
+        Raises:
+            BlastEnvError: If the bays were not recorded.
+        """
+        if not self.bays:
+            raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
+        responded = []
+        for load in self.structures:
+            own = [each for each in self.bays if each.structure == load.name]
+            response, most = structure_response(own, named, objective)
+            responded.append(replace(load, response=response, worst_damage=most))
+        return replace(self, structures=tuple(responded))
+
+    @property
+    def has_particles(self) -> bool:
+        """Whether these are loads by a particle engine."""
+        return any(load.impulse_sim is not None for load in self.structures)
+
+    @property
+    def level(self) -> LevelOfProtection:
+        """The level of protection of the facades of the protected structures."""
+        return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
+
+    def are_for(self, scenario: AnyScenario) -> bool:
+        """Return whether these can be the loads of a scenario.
+
+        They must be finite, one per structure and module, with its bays where it needs them.
+        """
+        found = find_scenario(scenario)
+        names = [structure.name for structure in found.structures]
+        modules = sum(structure.modules for structure in found.structures)
+        impulses = np.array([load.impulse_pa_s for load in self.structures])
+        return (
+            [load.name for load in self.structures] == names
+            and self.module_impulse.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse).all())
+            and self._has_bays_of(found)
+        )
+
+    def _has_bays_of(self, scenario: Scenario) -> bool:
+        """Return whether the bays and components are the scenario's, and the damage is finite."""
+        if not scenario.objective.is_response:
+            return not self.bays
+        known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
+        return bool(self.bays) and all(
+            known.get(each.name) == set(each.damage)
+            and np.isfinite([*each.damage.values(), each.area_m2, each.glazed_m2]).all()
+            for each in self.bays
+        )
+
+    @cached_property
+    def protected(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected structures."""
+        return tuple(load for load in self.structures if load.protected)
+
+    @cached_property
+    def _buildings(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected buildings."""
+        return on_buildings(self.protected)
+
+    @property
+    def protected_impulse_pa_s(self) -> float:
+        """Weighted sum of the impulses of the protected buildings, Pa*s."""
+        return sum(each.weight * each.impulse_pa_s for each in self._buildings)
+
+    @property
+    def protected_impulse_sim(self) -> float | None:
+        """Weighted sum of the impulses of the protected structures, simulation units.
+
+        `None` of an engine without particles.
+        """
+        sims = [(x.weight, x.impulse_sim) for x in self.protected if x.impulse_sim is not None]
+        return sum(weight * impulse for weight, impulse in sims) if sims else None
+
+    @property
+    def protected_peak_pa(self) -> float:
+        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
+        peaks = [load.peak_pa for load in self.protected]
+        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
+
+    def load(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures that an objective selects, in its unit."""
+        impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
+        return sum(
+            objective.load(
+                impulse_pa_s[load.building],
+                load.peak_pa or 0.0,
+                load.weight,
+                load.peak_weight,
+                load.response,
+            )
+            for load in self.protected
+        )
+
+    @property
+    def in_range(self) -> bool:
+        """Whether the load on every protected structure is in the range of the calibration."""
+        return all(load.in_range for load in self.protected)
+
+
+def structure_response(
+    bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
+) -> tuple[float, float]:
+    """Return the response of one structure in the objective, and the largest damage of its bays.
+
+    `bays` has their damage with each of their possible components, `named` the components of all
+    bays.
+    """
+    chosen = {each.bay.name: each for each in named}
+    is_glazing = objective.measure == "glazing"
+    damage, area_m2 = [], []
+    for each in bays:
+        bay = chosen[each.name]
+        names = (bay.glazing,) if is_glazing else (bay.glazing, bay.wall)
+        damage.append(worst(each.damage[name] for name in names if name is not None))
+        area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
+    return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
+
+
+class BlastKey(NamedTuple):
+    """All inputs that determine the record of a blast.
+
+    Attributes:
+        scenario_hash: Content hash of the scenario.
+        layout: The layout's cells, sorted.
+        charge: The charge at its place.
+        seed: Seed of fan and air.
+        engine: The engine with its version; see `engine_text`.
+        calibration: Digest of the calibration, for the loads in psi*s.
+        code: Version of the package; see `provenance.code_version`.
+        parts: Digest of the parts of the site that change no load, but what else a record has; see
+            `parts_digest`.
+    """
+
+    scenario_hash: str
+    layout: Layout
+    charge: Charge
+    seed: int
+    engine: str
+    calibration: str
+    code: str
+    parts: str = ""
+
+    @property
+    def text(self) -> str:
+        """The key as text, by which a store has the record."""
+        return json.dumps(self)
+
+    @property
+    def digest(self) -> str:
+        """A short digest, as a name of a folder."""
+        return sha256(self.text.encode()).hexdigest()[:24]
+
+
+KEY: Final = TypeAdapter(BlastKey)
+"""Reads a key from its text."""
+
+
+def parts_digest(scenario: Scenario) -> str:
+    """Return the digest of what a record depends on beside its loads; empty for a plain site.
+
+    These are the buildings of structures, the bays of facades, and the masses of barrier items. The
+    panes and walls in the bays are no part of it, nor are measures that replace them: their
+    response is computed from the histories.
+    """
+    zone = scenario.build_zone
+    items = [] if zone is None else [each.model_dump(mode="json") for each in zone.items]
+    structures = [
+        (each.name, each.building_name, each.facade and _division(each.facade))
+        for each in scenario.structures
+        if each.building_name != each.name or each.facade is not None
+    ]
+    if not (items or structures):
+        return ""
+    return sha256(json.dumps((items, structures)).encode()).hexdigest()
+
+
+def _division(facade: Any) -> tuple[float | int | None, ...]:
+    return facade.storey_m, facade.storeys, facade.bay_m
+
+
+class UnjudgedWalls(NamedTuple):
+    """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
+
+    Attributes:
+        building: Name of the building.
+        area_m2: Area of these walls that touches air, m2.
+        of_m2: Area of all counted walls of the building that touches air, m2.
+        structures: The parts of the building with such walls.
+    """
+
+    building: str
+    area_m2: float
+    of_m2: float
+    structures: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """A sentence that states the area and the parts."""
+        parts = ", ".join(self.structures)
+        return (
+            f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
+            "no verdict covers them"
+        )
+
+
+@dataclass(frozen=True)
+class BuildingLoad:
+    """The load on a building, over its counted walls, and that on its most loaded wall.
+
+    Attributes:
+        impulse_pa_s: Peak specific impulse, mean over the area of the walls.
+        peak_pa: Largest overpressure on a face of a cell.
+        counted_pa: The peak to compare with limits; see `blast_env.evaluation.engines.peaks`.
+        counted_by: Its source.
+        arrival_s: Arrival of the wave; NaN if none arrives.
+        wall: The wall with the largest impulse.
+        wall_impulse_pa_s: Impulse on it, mean.
+        duration_s: Duration of the first positive phase of the mean overpressure on it; NaN if no
+            wave arrives or the run ends before.
+        known: Whether these impulses were known when the run ended.
+        flagged: Whether there is a note on them.
+        stood: Standing of the mean impulse.
+    """
+
+    impulse_pa_s: float
+    peak_pa: float
+    counted_pa: float
+    counted_by: str
+    arrival_s: float
+    wall: WallName
+    wall_impulse_pa_s: float
+    duration_s: float
+    known: bool
+    flagged: bool
+    stood: ReasonedStanding
+
+
+class WallLoad(NamedTuple):
+    """The mean load on the most loaded wall of a building, whether or not its walls count.
+
+    Attributes:
+        wall: The wall.
+        peak_pa: Peak overpressure, reflected, mean over the wall.
+        impulse_pa_s: Impulse, reflected, mean over the wall.
+    """
+
+    wall: WallName
+    peak_pa: float
+    impulse_pa_s: float
+
+
+@dataclass(frozen=True)
+class BlastDetails:
+    """What a complete record has beside the loads and the histories.
+
+    Attributes:
+        peak_factor: Factor on peaks that corrects their clipping by the cells.
+        known: Whether the load on each bay was known when the run ended, by bay.
+        buildings: The load on each building with a counted wall in the air, by name.
+        walls: The load on the most loaded wall of each building, by name.
+        unchecked: A building and the reason to distrust its loads, for each with such a reason.
+        unjudged: Walls of buildings with a facade that no verdict covers.
+        notes: Notes on loads, gauges and oblique walls.
+        digest: Digest of the whole outcome.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(ser_json_inf_nan="constants")
+
+    peak_factor: float
+    known: dict[str, bool]
+    buildings: dict[str, BuildingLoad]
+    walls: dict[str, WallLoad]
+    unchecked: tuple[tuple[str, str], ...]
+    unjudged: tuple[UnjudgedWalls, ...]
+    notes: tuple[str, ...]
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class BlastRecord:
+    """The record of a blast.
+
+    Attributes:
+        loads: Loads on the structures.
+        details: What a complete record has beside; `None` of engines that give loads alone.
+        bays: Names of the bays of facades, in the order of the histories.
+        time_s: Times of the histories (times,).
+        pressure_pa: Mean overpressures on the bays (bays, times).
+        pieces: Barrier pieces, one row each; see `engines.pieces.PIECE_COLUMNS`. `None` without
+            details.
+        taken_away: Pieces that overturned in an earlier run of the blast and were removed for this
+            one; not stored.
+    """
+
+    loads: BlastLoads
+    details: BlastDetails | None = None
+    bays: tuple[str, ...] = ()
+    time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    pressure_pa: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    pieces: "pd.DataFrame | None" = None
+    taken_away: Layout = ()
+
+    @property
+    def complete(self) -> BlastDetails:
+        """The details.
+
+        Raises:
+            BlastEnvError: If the engine gives loads alone.
+        """
+        if self.details is None:
+            raise BlastEnvError("the engine records no walls and bays: must be 'gas'")
+        return self.details
+
+    def encoded(self) -> bytes:
+        """Return the record as bytes: a line of JSON, then the arrays."""
+        pieces = None if self.pieces is None else self.pieces.to_dict("split", index=False)
+        header = _Header(
+            structures=self.loads.structures,
+            damage=self.loads.bays,
+            modules=len(self.loads.module_impulse),
+            details=self.details,
+            bays=self.bays,
+            times=len(self.time_s),
+            pieces=json.dumps(pieces),  # NaN for numbers that they lack
+        )
+        arrays = (
+            self.loads.module_impulse.astype("<f8"),
+            self.time_s.astype("<f8"),
+            self.pressure_pa.astype("<f4"),  # as they were recorded
+        )
+        return b"\n".join((_HEADER.dump_json(header), b"".join(each.tobytes() for each in arrays)))
+
+    @classmethod
+    def decoded(cls, content: bytes) -> Self:
+        """Return the record of its bytes.
+
+        Raises:
+            ValueError: If they are damaged.
+        """
+        line, _, arrays = content.partition(b"\n")
+        header = _HEADER.validate_json(line)
+        ends = 8 * header.modules, 8 * (header.modules + header.times)
+        modules, time_s, pressure_pa = (
+            np.frombuffer(part, dtype=kind).astype(np.float64)
+            for part, kind in (
+                (arrays[: ends[0]], "<f8"),
+                (arrays[ends[0] : ends[1]], "<f8"),
+                (arrays[ends[1] :], "<f4"),
+            )
+        )
+        pieces = json.loads(header.pieces)
+        if pieces is not None:
+            import pandas as pd
+
+            pieces = pd.DataFrame(pieces["data"], columns=pieces["columns"])
+        return cls(
+            BlastLoads(header.structures, modules, header.damage),
+            header.details,
+            header.bays,
+            time_s,
+            pressure_pa.reshape(len(header.bays), header.times),
+            pieces,
+        )
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The part of a record that is no array, and the sizes of the arrays."""
+
+    __pydantic_config__: ClassVar = ConfigDict(ser_json_inf_nan="constants")
+
+    structures: tuple[StructureLoad, ...]
+    damage: tuple[BayDamage, ...]
+    modules: int
+    details: BlastDetails | None
+    bays: tuple[str, ...]
+    times: int
+    pieces: str
+
+
+_HEADER: Final = TypeAdapter(_Header)
