@@ -128,7 +128,7 @@ def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
     def interrupted(*_: Any) -> Any:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(GasEngine, "loads", interrupted)
+    monkeypatch.setattr(GasEngine, "record", interrupted)
     save_scenario(wide_yard(), tmp_path / "yard.toml")
     where = ("--scenario", str(tmp_path / "yard.toml"), "--out", str(tmp_path / "out"))
     options = ("--method", "package", "--verify", *where)
