@@ -111,7 +111,7 @@ def test_single_modules_are_proposed_without_a_blast(monkeypatch: pytest.MonkeyP
     def refused(*_: Any) -> Any:
         raise AssertionError("a blast was run")
 
-    monkeypatch.setattr(GasEngine, "loads", refused)
+    monkeypatch.setattr(GasEngine, "record", refused)
     zone = {"corner_m": (4.0, 3.0), "rows": 12, "columns": 2, "stock": 6, "height_m": 2.0}
     site = Scenario.from_document(wide_yard().model_dump() | {"build_zone": zone}, "modules")
     found = blast_env.propose(site, CHARGE)
