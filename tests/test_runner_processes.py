@@ -23,6 +23,8 @@ if __name__ == "__main__":
     run_all(work, [sys.argv[1]] * 2, 2)
 """
 COMMAND = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 import typer
 from blast_env.cli.command import ShellCommand
 from blast_env.runner import run_all
