@@ -59,7 +59,7 @@ PUBLIC: Final = (
     "blast_env.evaluation",
     "blast_env.calibration",
     "blast_env.io.importing",
-    "blast_env.report",
+    "blast_env.answers.report",
     "blast_env.benchmark",
     "blast_agents.training",
 )

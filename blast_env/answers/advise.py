@@ -20,7 +20,7 @@ _HEADERS: Final = (
 
 
 def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
-    """Yield the cost to pass, flags, the error of the cells, and the table of the kinds."""
+    """Yield the cost to pass, flags, the grid error, and the table of the kinds."""
     judge, best = found.judge, found.best
     scenario, target = judge.scenario, judge.target
     yield Line.of(_first_line(found, best), kind="answer")

@@ -59,7 +59,7 @@ def governing(blasts: Blasts) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Assessed:
-    """The consequences of blasts with each layout, and their errors of the cells.
+    """The consequences of blasts with each layout, and their grid errors.
 
     Attributes:
         blasts: The blasts, on coarser cells under the charge that governs.
@@ -201,7 +201,7 @@ def _coarse_number(blasts: Blasts) -> int:
 def response_cells(
     found: Consequences, building: str, coarse: Consequences | None = None, number: int = 0
 ) -> tuple[AnyCell, ...]:
-    """Return the response of a building; of the panes with the error of the cells.
+    """Return the response of a building; of the panes with the grid error.
 
     `coarse` has the response on coarser cells to the charge of a number.
     """

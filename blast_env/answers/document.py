@@ -4,6 +4,7 @@ A number has one format everywhere (`Number`). Renderers choose only its signs: 
 the terminal, typographic ones for pages.
 """
 
+from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, isnan, log10, nan
@@ -91,6 +92,12 @@ class Number:
         return f"{signs.plus_minus} {_digits(error, self.digits, _ERROR_FIGURES)}"
 
     @classmethod
+    def stated(cls, value: float, unit: str = "") -> Self:
+        """Return a number that a user gave, with all of its digits."""
+        digits = len(f"{value:.10f}".rstrip("0").partition(".")[2]) if isfinite(value) else None
+        return cls(value, unit, digits=digits)
+
+    @classmethod
     def share(cls, share: float, error: float = nan, *, flag: str = "") -> Self:
         """Return a share in per cent, with its error in percentage points."""
         return cls(_PERCENT * share, "%", _PERCENT * error, 1, flag=flag)
@@ -129,12 +136,13 @@ def _digits(value: float, digits: int | None, figures: int) -> str:
     return f"{value:z,.{digits}f}"
 
 
-AnyCell: TypeAlias = str | Number
-"""What stands in a cell of a table."""
+AnyText: TypeAlias = str | Number
+"""What stands in a line."""
 
 
-Kind: TypeAlias = Literal["", "answer", "flag", "quiet", "item"]
-"""What a line is for: the answer, a flag that qualifies it, something quiet, an item of a list."""
+Kind: TypeAlias = Literal["", "answer", "passes", "fails", "flag", "quiet", "item", "head", "code"]
+"""What a line is for: the answer, or a verdict; a flag that qualifies it, something quiet, an item
+of a list, a heading below that of the section, text to be copied."""
 
 
 @dataclass(frozen=True)
@@ -146,17 +154,21 @@ class Line:
         kind: What it is for.
     """
 
-    cells: tuple[AnyCell, ...]
+    cells: tuple[AnyText, ...]
     kind: Kind = ""
 
     @classmethod
-    def of(cls, *cells: AnyCell, kind: Kind = "") -> Self:
+    def of(cls, *cells: AnyText, kind: Kind = "") -> Self:
         """Return the line of some texts and numbers."""
         return cls(cells, kind)
 
     def text(self, signs: Signs = PLAIN) -> str:
         """Return its text."""
-        return "".join(cell_text(each, signs) for each in self.cells)
+        return "".join(cell_text(cell, signs) for cell in self.cells)
+
+
+AnyCell: TypeAlias = AnyText | Line
+"""What stands in a cell of a table."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +181,7 @@ class Table:
         rows: The rows: texts and numbers.
         texts: Number of leading text columns; the others are aligned to the right.
         after: Number of text columns at the end.
+        main: Indices of the rows that decide, which stand out.
     """
 
     title: str
@@ -176,6 +189,7 @@ class Table:
     rows: tuple[tuple[AnyCell, ...], ...]
     texts: int = 1
     after: int = 0
+    main: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -185,13 +199,18 @@ class Table:
         rows: Iterable[Sequence[AnyCell]],
         texts: int = 1,
         after: int = 0,
+        main: Iterable[int] = (),
     ) -> Self:
         """Return the table of some rows."""
-        return cls(title, (*headers,), tuple(map(tuple, rows)), texts, after)
+        return cls(title, (*headers,), tuple(map(tuple, rows)), texts, after, tuple(main))
 
     def cells(self, signs: Signs = PLAIN) -> list[tuple[str, ...]]:
         """Return the rows as texts."""
-        return [tuple(cell_text(each, signs) for each in row) for row in self.rows]
+        return [tuple(cell_text(cell, signs) for cell in row) for row in self.rows]
+
+    def is_number(self, column: int) -> bool:
+        """Return whether a column has numbers, which align to the right."""
+        return self.texts <= column < len(self.headers) - self.after
 
 
 @dataclass(frozen=True)
@@ -201,10 +220,17 @@ class Picture:
     Attributes:
         caption: Its caption.
         png: The picture as PNG.
+        is_large: Whether it is larger than others on paper.
     """
 
     caption: str
     png: bytes
+    is_large: bool = False
+
+    @property
+    def address(self) -> str:
+        """The picture as an address that holds it."""
+        return address_of(self.png)
 
 
 AnyPart: TypeAlias = Line | Table | Picture
@@ -217,10 +243,17 @@ class Section:
     Attributes:
         title: Its title; empty for parts that need none.
         parts: Lines, tables and pictures.
+        is_summary: Whether it is the summary of the document, in a box.
     """
 
     title: str
     parts: tuple[AnyPart, ...]
+    is_summary: bool = False
+
+    @classmethod
+    def of(cls, title: str, *parts: Iterable[AnyPart], is_summary: bool = False) -> Self:
+        """Return the section of some groups of parts."""
+        return cls(title, tuple(part for group in parts for part in group), is_summary)
 
 
 @dataclass(frozen=True)
@@ -247,7 +280,7 @@ class Document:
     @property
     def first(self) -> str:
         """The text of the first line."""
-        return next(each.text() for each in self.parts if isinstance(each, Line))
+        return next(part.text() for part in self.parts if isinstance(part, Line))
 
 
 def cell_text(cell: AnyCell, signs: Signs = PLAIN) -> str:
@@ -257,7 +290,12 @@ def cell_text(cell: AnyCell, signs: Signs = PLAIN) -> str:
 
 def lines(texts: Iterable[str], kind: Kind = "") -> Iterator[Line]:
     """Yield lines of texts."""
-    yield from (Line((each,), kind) for each in texts)
+    yield from (Line((text,), kind) for text in texts)
+
+
+def address_of(png: bytes) -> str:
+    """Return a picture as an address that holds it."""
+    return f"data:image/png;base64,{b64encode(png).decode()}"
 
 
 # Words that several answers share.

@@ -1,7 +1,5 @@
 """The renderer of documents for the page in a browser."""
 
-from base64 import b64encode
-
 from nicegui import ui
 
 from blast_env.answers.document import TYPOGRAPHIC, Document, Line, Picture, Table
@@ -21,7 +19,8 @@ def show(document: Document) -> None:
                 ui.label(part.title).classes("be-quiet")
                 fill(text_table(), part)
             elif isinstance(part, Picture):
-                ui.element("img").props(f'src="{address_of(part.png)}" alt="{part.caption}"')
+                image = ui.element("img").classes("w-full")
+                image.props(f'src="{part.address}" alt="{part.caption}"')
 
 
 def text_table() -> ui.table:
@@ -32,13 +31,12 @@ def text_table() -> ui.table:
 
 def fill(element: ui.table, table: Table) -> None:
     """Put a table into an element of `text_table`, which is hidden without rows."""
-    numbers = range(table.texts, len(table.headers) - table.after)
     element.columns = [
         {
             "name": str(number),
             "field": str(number),
             "label": label,
-            "align": "right" if number in numbers else "left",
+            "align": "right" if table.is_number(number) else "left",
         }
         for number, label in enumerate(table.headers)
     ]
@@ -47,8 +45,3 @@ def fill(element: ui.table, table: Table) -> None:
         for number, row in enumerate(table.cells(TYPOGRAPHIC))
     ]
     element.visible = bool(table.rows)
-
-
-def address_of(png: bytes) -> str:
-    """Return a picture as an address that holds it."""
-    return f"data:image/png;base64,{b64encode(png).decode()}"

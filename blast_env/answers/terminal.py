@@ -72,22 +72,21 @@ class TableView:
         yield Text(printable_line(self.table.title), style="bold")
         lines = zip(self.table.headers, *self.table.cells(PLAIN), strict=True)
         columns = [[printable_line(cell) for cell in column] for column in lines]
-        count = len(columns)
-        texts = {*range(self.table.texts), *range(count - self.table.after, count)}
         free = options.update(width=10_000)
         widths = [measure_renderables(console, free, [*map(Text, column)]) for column in columns]
-        for number, group in enumerate(self._groups(widths, options.max_width)):
-            if number:
+        for place, group in enumerate(self._groups(widths, options.max_width)):
+            if place:
                 yield Text()
             part = RichTable(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
             room = options.max_width - _BETWEEN * (len(group) - 1)
             for index, width in zip(
                 group, _shared([widths[index] for index in group], room), strict=True
             ):
-                side: Literal["left", "right"] = "left" if index in texts else "right"
+                side: Literal["left", "right"] = "right" if self.table.is_number(index) else "left"
                 part.add_column(columns[index][0], justify=side, width=width)
-            for row in zip(*(columns[index][1:] for index in group), strict=True):
-                part.add_row(*row)
+            rows = zip(*(columns[index][1:] for index in group), strict=True)
+            for number, row in enumerate(rows):
+                part.add_row(*row, style="bold" if number in self.table.main else None)
             yield part
 
     def _groups(self, widths: Sequence[Measurement], width: int) -> list[list[int]]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -73,10 +73,11 @@ def warm_engine() -> None:
 
 
 class Picture(StoredRecord):
-    """A picture of a blast: its file and its label."""
+    """A picture of a blast: its file, its label and what it shows."""
 
     file: str
     label: str
+    kind: Literal["film", "map", "walls", "gauge"]
 
 
 class BlastPictures(StoredRecord):
@@ -121,7 +122,7 @@ class BlastTask:
         """Run one blast per threat with the layout, and one without a barrier for comparison.
 
         Blasts with a record and pictures are not run again. The worst threat of the layout runs on
-        coarser cells at the end, for the error of the cells.
+        coarser cells at the end, for the grid error.
 
         Raises:
             BlastEnvError: If a blast cannot be run.
@@ -222,18 +223,18 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
         name = f"map_{quantity}.png"
         levels = scale.levels[quantity]
         save_figure(ground_map(result, quantity, levels=levels), folder / name)
-        yield Picture(file=name, label=f"{quantity} over the ground")
+        yield Picture(file=name, label=f"{quantity} over the ground", kind="map")
     for building in _facades_of(result):
         title = result.blast.scenario.title_of(building)
         for quantity in _QUANTITIES[::-1]:
             name = f"walls_{building}_{quantity}.png"
             full = scale.walls.get(building, {}).get(quantity)
             save_figure(facades(result, building, quantity, full=full), folder / name)
-            yield Picture(file=name, label=f"{quantity} on the walls of {title}")
+            yield Picture(file=name, label=f"{quantity} on the walls of {title}", kind="walls")
     for number, gauge in enumerate(result.gauges["name"]):
         name = f"gauge_{number}.png"
         save_figure(gauge_history(result, gauge), folder / name)
-        yield Picture(file=name, label=f"gauge {gauge}")
+        yield Picture(file=name, label=f"gauge {gauge}", kind="gauge")
 
 
 def _film(shot: PressureShot, scale: Scale, folder: Path) -> Picture:
@@ -250,4 +251,4 @@ def _film(shot: PressureShot, scale: Scale, folder: Path) -> Picture:
             loop=0,
             quality=_QUALITY,
         )
-    return Picture(file=_FILM, label="film")
+    return Picture(file=_FILM, label="film", kind="film")

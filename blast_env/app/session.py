@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from blast_env.answers.compare import BuildingVerdict, building_verdicts, comparison
 from blast_env.answers.document import Table, charge_text
@@ -34,16 +34,13 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.questions.capacity import MOST_BLASTS
 from blast_env.evaluation.questions.probability import Uncertainty
 from blast_env.evaluation.questions.verdict import BuildingResponse, Consequences, response_to
+from blast_env.evaluation.study import StudyCost, StudyOptions, StudyPlan
 from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
-
-if TYPE_CHECKING:
-    from blast_env.report import StudyOptions
-    from blast_env.report.cost import ReportCost
 
 NO_FACADE = "Give structures windows or wall panels first (on the left)."
 """Message where no structure has a facade, so that there is no level of protection."""
@@ -260,9 +257,7 @@ class Session:
         task = ReportTask(self.scenario, self.design.layout, options, page, pdf)
         return self._begin(task, f"report {page.name if pdf is None else pdf.name}")
 
-    def _study_options(self, contents: Mapping[str, Any]) -> "StudyOptions":
-        from blast_env.report import StudyOptions  # needs an extra
-
+    def _study_options(self, contents: Mapping[str, Any]) -> StudyOptions:
         if not self.design.layout:
             raise BlastEnvError(
                 f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
@@ -418,16 +413,14 @@ class Session:
         """The engine of searches: with coarser cells than those of final statements."""
         return self.engine.coarser or self.engine
 
-    def cost_of_report(self, **contents: Any) -> "ReportCost":
+    def cost_of_report(self, **contents: Any) -> StudyCost:
         """Return the cost of a report on the active layout; see `report`.
 
         Raises:
             BlastEnvError: If the layout is empty, or there are too many threats.
         """
-        from blast_env.report.cost import ReportCost  # needs an extra
-
         options = self._study_options(contents)
-        return ReportCost.of(self.scenario, self.design.layout, options)
+        return StudyPlan(self.scenario, self.design.layout, options).cost()
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return the costs of the blasts of a search."""

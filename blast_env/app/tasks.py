@@ -25,7 +25,7 @@ from blast_env.site import Scenario
 from blast_env.site.sources import source_of
 
 if TYPE_CHECKING:
-    from blast_env.report import StudyOptions
+    from blast_env.evaluation.study import StudyOptions
 
 _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
 
@@ -212,10 +212,9 @@ class ReportTask:
             KeyboardInterrupt: If it was stopped before it had any part.
         """
         # Reports need an extra, and most work is no report.
-        from blast_env.report import run_study, write_report
-        from blast_env.report.cost import ReportCost
+        from blast_env.answers import report as reports
 
-        cost = ReportCost.of(self.site, self.layout, self.options)
+        cost = reports.StudyPlan(self.site, self.layout, self.options).cost()
         writer.write(grace_s=_WRITING_S)
 
         def tell(what: str, part: float) -> None:
@@ -223,10 +222,10 @@ class ReportTask:
             if writer.is_due or share is None:
                 writer.write(text=what, share=writer.status.share if share is None else share)
 
-        study = run_study(self.site, self.layout, self.options, tell)
-        written = write_report(study, self.page, self.pdf)
+        found = reports.run_report(self.site, self.layout, self.options, tell)
+        written = reports.write_report(found, self.page, self.pdf)
         words = f"wrote {' and '.join(path.name for path in written)}"
-        if study.stopped:
-            words = f"stopped before: {study.stopped}; {words} with the finished parts"
-        state = "stopped" if study.stopped else "done"
+        if stopped := found.study.stopped:
+            words = f"stopped before: {stopped}; {words} with the finished parts"
+        state = "stopped" if stopped else "done"
         writer.write(state=state, share=1.0, text=words, file=str(written[-1]))

@@ -9,7 +9,8 @@ import typer
 
 from blast_env.answers.assess import Assessed, assessment, capacity_answer, governing
 from blast_env.answers.document import charge_text
-from blast_env.answers.terminal import print_line, print_parts, print_table
+from blast_env.answers.screening import screening_answer
+from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     CacheOption,
@@ -37,12 +38,7 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines import JUDGE, Engine, final_engine
 from blast_env.evaluation.questions.capacity import MOST_BLASTS
 from blast_env.evaluation.questions.capacity import capacity as capacity_of
-from blast_env.evaluation.questions.screening import (
-    LEFT_OUT,
-    STAND_OFF_HEADERS,
-    THREAT_HEADERS,
-    Screening,
-)
+from blast_env.evaluation.questions.screening import Screening
 from blast_env.evaluation.questions.screening import screen as screen_site
 from blast_env.evaluation.questions.verdict import (
     BuildingResponse,
@@ -54,7 +50,6 @@ from blast_env.evaluation.questions.verdict import (
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import response_words
 from blast_env.response.requirements import Requirement
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.presets import (
@@ -136,7 +131,7 @@ def assess(
     Gas dynamics runs one blast per charge, with and without the layout; the barrier is judged as
     well. A structure needs a facade in the scenario file; one without is judged as an ordinary
     house. The effect of better glass needs no further blast, and is printed as well. The worst
-    charge runs on cells twice as large as well: the difference gives the error of the cells.
+    charge runs on cells twice as large as well: the difference gives the grid error.
 
     --screen takes Kingery and Bulmash's loads in the open, by angle of incidence and sight.
     --capacity runs a few blasts at each place, with other masses and stand-offs.
@@ -238,20 +233,11 @@ def _screen(
     named = [NamedMass.parsed(each) for each in masses]
     found = screen_site(scenario, layout, named)
     beside = {} if engine is None else _by_gas(scenario, layout, found, engine)
-    print_line(f"required: {'; '.join(each.words for each in required)}")
-    title = layout_counts(layout, "barrier") if layout else "no barrier"
-    _print_threats(f"{scenario.name}, {title}: worst place by damage", found, required, beside)
-    for each in found.threats:
-        title = (
-            f"stand-off (m) from which a component allows a level, {each.name},"
-            f" {each.charge.tnt_kg:g} kg TNT (* on this site)"
-        )
-        print_table(title, STAND_OFF_HEADERS, found.stand_off_rows(each))
+    print_parts(screening_answer(scenario, layout, found, required, beside))
     if named:
         print_line(f"presets: {PRESETS_SOURCE}")
     if any("," in each for each in masses):
         print_line(f"TNT equivalents: {EQUIVALENTS_SOURCE}")
-    print_line(LEFT_OUT)
     if engine is None:
         print_line("--gas shows by how much that matters at each worst place")
 
@@ -274,20 +260,3 @@ def _by_gas(
     with progress_bar(f"{len(threats)} blasts") as progress:
         blasts = campaign.run(progress)
     return {each.name: consequences_of(blasts.under([k])) for k, each in enumerate(threats)}
-
-
-def _print_threats(
-    title: str,
-    found: Screening,
-    required: Sequence[Requirement],
-    beside: Mapping[str, Consequences],
-) -> None:
-    rows = []
-    for each in found.threats:
-        rows.append(found.threat_row(each, required))
-        if each.name in beside:
-            by_gas = beside[each.name]
-            words = response_words([each.facade for each in by_gas.responses])
-            flagged = "flagged" if by_gas.is_flagged else ""
-            rows.append(("  by gas", *[""] * 4, *words, flagged))
-    print_table(title, THREAT_HEADERS, rows, 2)

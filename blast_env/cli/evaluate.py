@@ -91,7 +91,7 @@ def evaluate(
     Each seed draws a charge from the scenario; for particles, also the fan and the air.
 
     Gas dynamics runs on cells of 0.25 m. The worst charge runs on cells twice as large as well: the
-    difference gives the error of the cells beside each number.
+    difference gives the grid error beside each number.
     """
     check_cvar_level(cvar_level)
     given = GivenCharge.of(charge, tnt_kg)

@@ -36,7 +36,7 @@ from blast_env.site.blast_site import Charge
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:
-    from blast_env.report import StudyOptions
+    from blast_env.answers.report import StudyOptions
 
 
 def report(
@@ -56,7 +56,7 @@ def report(
     cells: tuple[str, str] | None = typer.Option(
         None,
         help="Sides of the cells of gas dynamics, m, or coarse fine, which grow; the same twice is "
-        "one size, without the error of the cells.",
+        "one size, without a grid error.",
         metavar="COARSE FINE",
         show_default="0.5 0.25; coarse fine on sites wider than 40 m",
     ),
@@ -86,14 +86,13 @@ def report(
     site = load_scenario(scenario)
     elements = load_layout(layout, site)
     # Here, because reports need extras, and Numba half a second.
-    from blast_env.report import run_study, write_report
-    from blast_env.report.cost import ReportCost
-    from blast_env.report.page import check_targets
+    from blast_env.answers import report as reports
 
-    check_targets(out, pdf)
+    reports.check_targets(out, pdf)
     options = _study_options(site, context.params)
+    given = reports.ReportDetails.read(details)
     check_layout(site, elements)
-    cost = ReportCost.of(site, elements, options)
+    cost = reports.StudyPlan(site, tuple(elements), options).cost()
     message_console().print(cost.words)
     resume = resume_words(cache)
     if cache is not None:
@@ -105,29 +104,26 @@ def report(
             if share is not None:
                 progress(share)
 
-        study = run_study(site, elements, options, tell)
-    print_line(" and ".join((options.coarse.describe(), options.words[1])))
-    print_written(write_report(study, out, pdf))
-    if study.stopped:
-        raise InterruptedCommandError(
-            f"{out} has the parts finished before: {study.stopped}", resume
-        )
+        found = reports.run_report(site, elements, options, tell)
+    coarse, fine = options.engines
+    print_line(f"{coarse.describe()} and {fine.cell_words}")
+    print_written(reports.write_report(found, out, pdf, given))
+    if stopped := found.study.stopped:
+        raise InterruptedCommandError(f"{out} has the parts finished before: {stopped}", resume)
 
 
 def _study_options(scenario: Scenario, values: Mapping[str, Any]) -> "StudyOptions":
     """Return the options of the study from the values of the command line, by their names."""
-    from blast_env.report import Limit, StudyOptions, final_cells
-    from blast_env.report.details import read_details
+    from blast_env.answers.report import Limit, StudyOptions, final_cells
 
-    given = {each.name: values[each.name] for each in fields(StudyOptions)}
+    given = {own.name: values[own.name] for own in fields(StudyOptions)}
     given |= {
-        "details": read_details(values["details"]),
-        "charges": tuple(_charge(each, scenario) for each in values["charges"]),
+        "charges": tuple(_charge(text, scenario) for text in values["charges"]),
         "limits": tuple(Limit.parsed(text) for text in values["limits"]),
         "cells": final_cells(scenario),
     }
     if values["cells"]:
-        given["cells"] = tuple(_cells(each) for each in values["cells"])
+        given["cells"] = tuple(_cells(text) for text in values["cells"])
     if values["target"] is not None:
         given["target"] = LevelOfProtection.named(values["target"])
     return StudyOptions(**given)
@@ -138,7 +134,7 @@ def _charge(given: str, scenario: Scenario) -> Charge:
     masses_kg = sorted({source.tnt_kg for source in scenario.charge})
     x_m, y_m, *own_kg = numbers("--charge", given, CHARGE)
     if not own_kg and len(masses_kg) > 1:
-        known = ", ".join(f"{each:g}" for each in masses_kg)
+        known = ", ".join(f"{mass_kg:g}" for mass_kg in masses_kg)
         raise BlastEnvError(
             f"--charge is {x_m:g},{y_m:g} without a mass, but the scenario has charges of {known} "
             "kg: say X,Y,KG"
@@ -150,7 +146,7 @@ def _cells(text: str) -> Cells:
     """Return the cells of a text: a side, m, or the name of growing cells."""
     with suppress(BlastEnvError):
         return plain_number("--cells", text)
-    growing = [each for each in CELLS if each != UNIFORM]
+    growing = [name for name in CELLS if name != UNIFORM]
     if text not in growing:
         known = ", ".join(growing)
         raise BlastEnvError(f"--cells is {value_text(text)}, must be a length in m, or {known}")

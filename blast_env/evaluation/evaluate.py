@@ -104,7 +104,7 @@ def compare(
         layouts: One per case: (row, column) of the cells that hold a module, in any order. For
             several layouts on the same threats, the empty site is simulated only once.
         processes: Number of worker processes; it changes only the time.
-        with_error: Whether the worst threat runs on coarser cells too, for the error of the cells.
+        with_error: Whether the worst threat runs on coarser cells too, for the grid error.
         cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
         progress: Called with the finished share of the blasts.
 

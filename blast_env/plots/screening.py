@@ -6,7 +6,7 @@ from typing import Final
 
 import shapely
 
-from blast_env.evaluation.questions.screening import ScreenedThreat, Screening
+from blast_env.evaluation.questions.screening import Screening, ThreatScreening
 from blast_env.geometry import Layout
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.plan import Kinds, charge_feature, site_features, without
@@ -93,7 +93,7 @@ def _draw_rings(
     scenario: Scenario,
     facades: shapely.Geometry,
     found: Screening,
-    threat: ScreenedThreat,
+    threat: ThreatScreening,
 ) -> None:
     """Draw the ground of each level, the widest ring first, and its legend."""
     needed_m = {
@@ -137,7 +137,7 @@ def _patch(
     level: LevelOfProtection,
     needed_m: dict[LevelOfProtection, float],
     found: Screening,
-    threat: ScreenedThreat,
+    threat: ThreatScreening,
 ) -> Patch:
     words = "nearer"
     if level in needed_m:

@@ -14,9 +14,8 @@ from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.study import StudyOptions, StudyPlan
 from blast_env.gas import CostGuess, cost_words, time_words
-from blast_env.report import StudyOptions
-from blast_env.report.cost import ReportCost
 from blast_env.site import load_scenario
 from tests.app.here import Here
 from tests.gas_sites import WALL, hut
@@ -54,7 +53,9 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
     (threat,) = session.chosen_threats()
     there = session.folder.blast_of(session.key((), threat))
     there.mkdir()
-    record = BlastPictures(pictures=(Picture(file="a.png", label="a"),), seconds=1.0, repeat={})
+    record = BlastPictures(
+        pictures=(Picture(file="a.png", label="a", kind="map"),), seconds=1.0, repeat={}
+    )
     write_kept(record, there / PICTURES)
     assert len(session.cost([0])) == 2  # its record is not there
     evaluator = BlastEvaluator(session.scenario, session.engine, cache=session.work.cache)
@@ -65,18 +66,18 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
 
 def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
     options = StudyOptions(charges=(threats_of(hut())[0].charge,))
-    cost = ReportCost.of(hut(), WALL, options)
-    sizes = [each.cells for each in cost.blasts]
+    cost = StudyPlan(hut(), WALL, options).cost()
+    sizes = [blast.cells for blasts in cost.parts.values() for blast in blasts]
     assert len(sizes) == 4 + len(WALL)  # the one other place is the threat's
     assert cost.drawn == 2
-    assert sum(each == max(sizes) for each in sizes) == 2
-    shares = [cost.share(label, share) or 0.0 for label, _ in cost.parts for share in (0.0, 1.0)]
+    assert sum(size == max(sizes) for size in sizes) == 2
+    shares = [cost.share(label, share) or 0.0 for label in cost.parts for share in (0.0, 1.0)]
     assert shares[0] == 0.0
     assert shares[-1] == pytest.approx(1.0)
     assert shares == sorted(shares)
     assert cost.share("no part", 0.5) is None
-    one = ReportCost.of(hut(), WALL, replace(options, cells=(0.5, 0.5), items=False))
-    assert len(one.blasts) == 2
+    one = StudyPlan(hut(), WALL, replace(options, cells=(0.5, 0.5), items=False)).cost()
+    assert sum(map(len, one.parts.values())) == 2
 
 
 def test_words() -> None:

@@ -218,7 +218,7 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
         await user.should_see("mean impulse on protected facades: ", retries=10)
         (label,) = user.find("mean impulse on protected facades: ").elements
         assert "\N{PLUS-MINUS SIGN}" in str(getattr(label, "text", ""))
-        await user.should_see("error of the cells, from the worst charge")
+        await user.should_see("grid error, from the worst charge")
         pictures = next(
             each for each in user.find(kind=ui.select).elements if each.props["label"] == "picture"
         )

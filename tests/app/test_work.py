@@ -15,8 +15,9 @@ import pytest
 from PIL import Image
 from pydantic import TypeAdapter
 
-from blast_env import report
+from blast_env.answers import report
 from blast_env.answers.compare import comparison, verdict_table
+from blast_env.answers.report import StudyOptions
 from blast_env.app import blasts, offers
 from blast_env.app.blasts import PICTURES, BlastPictures
 from blast_env.app.design import SLOTS
@@ -41,7 +42,6 @@ from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.record import BlastRecord
 from blast_env.geometry import Layout
-from blast_env.report import StudyOptions
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge, Scenario, load_scenario
 from tests.app.here import Here, rows_of
@@ -568,18 +568,18 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
         scenario: Scenario, layout: Layout, options: StudyOptions, tell: Callable[..., None]
     ) -> SimpleNamespace:
         asked.update(scenario=scenario, layout=layout, options=options)
-        for label in ("without each item", "other places", "stopped before: nothing"):
+        for label in ("T1, cells of 0.5 m", "other places", "stopped before: nothing"):
             sleep(0.11)  # more often nobody is told
             tell(label, 0.5)
             status = state_of(session)
             seen.append(status.share)
             assert (status.text, status.grace_s) == (label, 300.0)
-        return SimpleNamespace(stopped=stopped)
+        return SimpleNamespace(study=SimpleNamespace(stopped=stopped))
 
     def write(_: object, page: Path, pdf: Path | None) -> list[Path]:
         return [page] if pdf is None else [page, pdf]
 
-    monkeypatch.setattr(report, "run_study", study)
+    monkeypatch.setattr(report, "run_report", study)
     monkeypatch.setattr(report, "write_report", write)
     session = session_on(tmp_path, hut())
     with pytest.raises(BlastEnvError, match="layout A is empty"):
@@ -588,7 +588,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     contents = {"cells": (0.5, 0.5), "items": False, "target": LevelOfProtection.MEDIUM}
     session.report(tmp_path / "r.html", tmp_path / "r.pdf", **contents)
     cost = session.cost_of_report(**contents)
-    shares = [cost.share("without each item", 0.5), cost.share("other places", 0.5)]
+    shares = [cost.share("T1, cells of 0.5 m", 0.5), cost.share("other places", 0.5)]
     assert seen == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
     status = state_of(session)
     assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))

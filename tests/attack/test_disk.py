@@ -6,13 +6,11 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from datetime import datetime
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 from typing import Any, Final
-from unittest.mock import Mock, patch
 
 import gymnasium
 import numpy as np
@@ -28,6 +26,7 @@ from blast_agents.training.weights import read_parameters, write_model
 from matplotlib.figure import Figure
 from stable_baselines3 import PPO
 
+from blast_env.answers.html import write_page
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import is_temporary
@@ -37,7 +36,6 @@ from blast_env.parquet import write_table
 from blast_env.particles import COLLISION_COLUMNS
 from blast_env.particles.calibration import load_calibration, save_calibration
 from blast_env.plots import save_figure, write_film
-from blast_env.report.page import write_report
 from blast_env.site import save_scenario
 from blast_env.tables import write_csv
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
@@ -94,9 +92,8 @@ def _evaluations(path: Path) -> None:
 
 
 def _report(path: Path) -> None:
-    """Write a page that says little: its numbers cost blasts."""
-    with patch("blast_env.report.page.report_html", lambda *_: "<p>" + "words " * 600):
-        write_report(Mock(), path, None, [])
+    """Write a page that says little: the numbers of a report cost blasts."""
+    write_page("<p>" + "words " * 600, path)
 
 
 WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
@@ -141,10 +138,8 @@ def test_what_was_there_outlives_a_full_device(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where only the last byte has no room, as with a film whose index comes last."""
-    # Drawings and reports say when they were made, in as many bytes as the moment needs.
+    # Drawings say when they were made, in as many bytes as the moment needs.
     monkeypatch.setattr("ezdxf.options.write_fixed_meta_data_for_testing", True)
-    then = SimpleNamespace(now=lambda zone: datetime(2026, 1, 1, tzinfo=zone))
-    monkeypatch.setattr("blast_env.report.page.datetime", then)
     path = tmp_path / name
     WRITERS[name](path)
     size = path.stat().st_size

@@ -1,4 +1,4 @@
-"""The error of the cells: the index, the cells it takes, and where it stands."""
+"""The grid error: the index, the cells it takes, and where it stands."""
 
 from dataclasses import replace
 

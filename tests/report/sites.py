@@ -1,7 +1,11 @@
 """A site on which a report takes seconds."""
 
+from collections.abc import Sequence
 from typing import Any
 
+from blast_env.answers.document import Document, Table
+from blast_env.answers.html import page_of
+from blast_env.answers.report import Report, ReportDetails, report_document
 from blast_env.site import Scenario
 from tests.gas_sites import WALL, hut
 
@@ -22,3 +26,17 @@ def glazed_hut() -> Scenario:
     facade = {"storey_m": 2.0, "glazing": "low", "wall": "concrete_200"}
     document["structures"][0]["facade"] = facade
     return Scenario.from_document(document, "hut")
+
+
+def page_text(
+    report: Report, commands: Sequence[str] = (), details: ReportDetails | None = None
+) -> str:
+    """Return a report as an HTML page."""
+    title = report.study.scenario.name
+    return page_of(report_document(report, commands), title, details)
+
+
+def table_of(document: Document, title: str) -> Table:
+    """Return the table of a document with a title."""
+    tables = (part for part in document.parts if isinstance(part, Table))
+    return next(table for table in tables if table.title == title)

@@ -3,16 +3,14 @@
 import pandas as pd
 import pytest
 
+from blast_env.answers.report import Limit, Report
 from blast_env.calibration import kingery_bulmash
 from blast_env.evaluation.engines.peaks import CountedPeak, PeakSource, counted_peak
 from blast_env.geometry import Layout
 from blast_env.layout import build_site
-from blast_env.report.limits import Limit
-from blast_env.report.page import report_html
-from blast_env.report.study import Study
-from blast_env.report.verdict import StudyVerdict
 from blast_env.response import peak_factor
 from tests.gas_sites import WALL, hut
+from tests.report.sites import page_text
 
 
 def counted(peak_pa: float, layout: Layout, outward_x: float = -1.0) -> CountedPeak:
@@ -42,13 +40,13 @@ def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(
     assert counted(1.1 * curve_pa, layout, outward_x).pa == pytest.approx(factor * 1.1 * curve_pa)
 
 
-def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:
-    pair = study.fine[0]
-    unprotected = pair.unprotected
-    assert unprotected.counted_by == PeakSource.CURVE
-    limit = Limit("hut", peak_pa=0.5 * (unprotected.peak_pa + unprotected.counted_pa))
-    assert unprotected.peak_pa < limit.peak_pa < unprotected.counted_pa
-    assert not limit.is_kept(unprotected)
-    words = f"(Kingery-Bulmash reflected; gas {unprotected.peak_pa / 1e3:.0f})"
-    assert words in report_html(study, ["blast-env"])
-    assert [each for _, each in StudyVerdict(study).limits] == [pair]
+def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(
+    report: Report,
+) -> None:
+    (own,) = report.study.verdicts[0].limited
+    assert own.load.counted_by == PeakSource.CURVE
+    limit = Limit("hut", peak_pa=0.5 * (own.load.peak_pa + own.load.counted_pa))
+    assert own.load.peak_pa < limit.peak_pa < own.load.counted_pa
+    assert not limit.is_kept(own.load)
+    words = f"(Kingery-Bulmash reflected; gas {own.load.peak_pa / 1e3:.0f})"
+    assert words in page_text(report)

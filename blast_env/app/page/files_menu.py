@@ -12,6 +12,7 @@ from blast_env.app.page.uploads import complain, file_upload, read_upload, site_
 from blast_env.app.session import Session
 from blast_env.app.sources import layout_of_file
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.study import final_cells
 from blast_env.files import scratch_folder
 from blast_env.gas.settings import Cells
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout
@@ -20,7 +21,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario
 
 _CELLS: Final[dict[tuple[Cells, Cells], str]] = {
-    (0.5, 0.25): "0.5 and 0.25 m: with the error of the cells",
+    (0.5, 0.25): "0.5 and 0.25 m: with the grid error",
     (0.5, 0.5): "0.5 m only: much quicker",
     ("coarse", "fine"): "coarse and fine: growing cells, for sites of 40 m and more",
     ("coarse", "coarse"): "coarse only: growing cells, much quicker",
@@ -138,8 +139,6 @@ class ReportDialog:
             ui.label(f"Report on layout {SLOTS[session.design.active]}: {kind}").style(
                 "font-weight: 600"
             )
-            from blast_env.report import final_cells  # needs an extra
-
             cells = final_cells(session.scenario)
             self._cells = ui.select(_CELLS, value=cells, label="cells of gas dynamics")
             wanted = session.scenario.objective.level or LevelOfProtection.LOW

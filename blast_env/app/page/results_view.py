@@ -7,8 +7,9 @@ from typing import Any, Final
 from nicegui import background_tasks, run, ui
 
 from blast_env.answers.compare import headline, verdict_table
-from blast_env.answers.document import TYPOGRAPHIC
-from blast_env.answers.page import address_of, fill, text_table
+from blast_env.answers.document import TYPOGRAPHIC, address_of
+from blast_env.answers.page import fill, text_table
+from blast_env.app.blasts import Picture
 from blast_env.app.session import Session, ShownLayout
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.blasts import NO_BARRIER, Blasts
@@ -17,7 +18,6 @@ from blast_env.evaluation.questions.grid_error import GridError
 _FILM: Final = "film"
 _NOTHING: Final = "No results yet for the current layouts: press Blast."
 _RUNNING: Final = "Running: the panel Work shows the progress."
-_DAMAGE: Final = "damage of "
 _START_FILMS: Final = """
 const films = [...document.querySelectorAll("img.be-film")];
 Promise.all(films.map((film) => fetch(film.src).then((answer) => answer.blob()))).then((blobs) =>
@@ -34,14 +34,14 @@ class _Found:
         shown: The layout.
         blasts: Its blasts and those without a barrier.
         number: Number of the threat in them.
-        pictures: Addresses of its pictures, by their labels.
+        pictures: Its pictures by their labels, each with its address.
         damage: Names of the buildings whose damage can be drawn, by the labels of these pictures.
     """
 
     shown: ShownLayout
     blasts: Blasts
     number: int
-    pictures: Mapping[str, str]
+    pictures: Mapping[str, tuple[str, Picture]]
     damage: Mapping[str, str]
 
 
@@ -87,7 +87,7 @@ class ResultsView:
             ).classes("be-quiet")
             self._table = text_table().classes("mt-2")
             self._errors = ui.label(
-                "\N{PLUS-MINUS SIGN}: error of the cells, from the worst charge of each layout on "
+                "Beside loads: the grid error, from the worst charge of each layout on "
                 "cells twice as large; of reductions in percentage points."
             ).classes("be-quiet")
             self._notes = ui.column().classes("gap-0 mt-1")
@@ -140,9 +140,9 @@ class ResultsView:
             if blasts is None or threat not in blasts.threats or not drawn:
                 continue
             where = f"/blasts/{session.folder.design_id}/{each.key}"
-            pictures = {own.label: f"{where}/{own.file}" for own in drawn}
+            pictures = {own.label: (f"{where}/{own.file}", own) for own in drawn}
             judged = (own.building for own in session.judged(each, threat))
-            damage = {f"{_DAMAGE}{session.scenario.title_of(own)}": own for own in judged}
+            damage = {f"damage of {session.scenario.title_of(own)}": own for own in judged}
             yield _Found(each, blasts, blasts.threats.index(threat), pictures, damage)
 
     def _offer(self, found: Sequence[_Found]) -> None:
@@ -154,13 +154,14 @@ class ResultsView:
 
     def _show_cards(self, found: Sequence[_Found], threat: LoadCase) -> None:
         self._cards.clear()
-        wide = self._what.startswith(_DAMAGE) or " on the walls of " in self._what
+        kinds = {each.pictures[self._what][1].kind for each in found if self._what in each.pictures}
+        wide = "walls" in kinds or any(self._what in each.damage for each in found)
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
             for each in found:
                 self._card(each, threat)
-        if self._what == _FILM and len(found) > 1:
+        if "film" in kinds and len(found) > 1:
             ui.run_javascript(_START_FILMS)
 
     def _card(self, found: _Found, threat: LoadCase) -> None:
@@ -173,8 +174,9 @@ class ResultsView:
                 ui.label(self._summary(found)).classes("be-quiet")
             image = ui.element("img").props(f'alt="{self._what}, {title}"')
             if self._what in found.pictures:
-                image.props(f'src="{found.pictures[self._what]}"')
-                image.classes("be-film" if self._what == _FILM else "")
+                address, picture = found.pictures[self._what]
+                image.props(f'src="{address}"')
+                image.classes("be-film" if picture.kind == "film" else "")
             elif self._what in found.damage:
                 building = found.damage[self._what]
                 background_tasks.create(self._draw(image, found.shown, threat, building))

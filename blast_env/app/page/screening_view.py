@@ -4,17 +4,12 @@ from typing import Final
 
 from nicegui import background_tasks, run, ui
 
-from blast_env.answers.document import Table
-from blast_env.answers.page import address_of, fill, text_table
+from blast_env.answers.document import Document, Picture
+from blast_env.answers.page import show
+from blast_env.answers.screening import screening_answer
 from blast_env.app.session import NO_FACADE, Session
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.questions.screening import (
-    LEFT_OUT,
-    STAND_OFF_HEADERS,
-    THREAT_HEADERS,
-    Screening,
-    screen,
-)
+from blast_env.evaluation.questions.screening import screen
 from blast_env.geometry import Layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
@@ -51,11 +46,8 @@ class ScreeningView:
                 element.on_value_change(self.refresh)
         with ui.element("div").classes("be-results"):
             self._said = ui.label().classes("be-quiet").props('aria-live="polite"')
-            self._threats = text_table()
-            self._picture = ui.element("img").props('alt="stand-offs as rings"').classes("w-full")
-            self._threats.visible = self._picture.visible = False
-            self._stand_offs = ui.column().classes("w-full gap-1")
-            ui.label(f"{LEFT_OUT}; presets: {PRESETS_SOURCE}").classes("be-quiet")
+            self._answer = ui.column().classes("w-full gap-1")
+            ui.label(f"presets: {PRESETS_SOURCE}").classes("be-quiet")
 
     def show(self, is_open: bool) -> None:
         """Begin or end to follow the design."""
@@ -81,7 +73,8 @@ class ScreeningView:
         session = self._session
         masses = [NamedMass(name, CHARGE_PRESETS[name][0]) for name in self._masses.value]
         required = Requirement.parsed(self._required.value)
-        answer: tuple[Screening, str] | BlastEnvError | None
+        answer: Document | None = None
+        words = ""
         try:
             if not session.scenario.bays:
                 raise BlastEnvError(NO_FACADE)
@@ -89,40 +82,23 @@ class ScreeningView:
                 _answer, session.scenario, session.design.layout, masses, required
             )
         except BlastEnvError as error:
-            answer = error
-        if answer is None or state != self._state or self._said.is_deleted:
+            words = str(error)
+        if not (answer or words) or state != self._state or self._said.is_deleted:
             return  # changed meanwhile, or closed
-        self._put(answer, required)
-
-    def _put(self, answer: "tuple[Screening, str] | BlastEnvError", required: Requirement) -> None:
-        self._stand_offs.clear()
-        failed = isinstance(answer, BlastEnvError)
-        self._threats.visible = self._picture.visible = not failed
-        if isinstance(answer, BlastEnvError):
-            self._said.text = str(answer)
-            return
-        found, picture = answer
-        self._said.text = f"required: {required.words}; worst place of each threat by damage"
-        rows = [found.threat_row(each, [required]) for each in found.threats]
-        fill(self._threats, Table.of("", THREAT_HEADERS, rows, len(THREAT_HEADERS)))
-        self._picture.props(f'src="{picture}"')
-        with self._stand_offs:
-            for each in found.threats:
-                ui.label(f"stand-off (m) for each level, {each.name} (* on this site)")
-                of_each = found.stand_off_rows(each)
-                table = Table.of("", STAND_OFF_HEADERS, of_each, len(STAND_OFF_HEADERS))
-                fill(text_table(), table)
+        self._said.text = words
+        self._answer.clear()
+        with self._answer:
+            show(answer or Document(()))
 
 
 def _answer(
     scenario: Scenario, layout: Layout, masses: list[NamedMass], required: Requirement
-) -> tuple[Screening, str]:
-    """Return a screening and its picture as an address of data."""
+) -> Document:
     # Here, because pictures take half a second to import.
     from blast_env.plots.figures import png_of
     from blast_env.plots.screening import screening_picture
 
     found = screen(scenario, layout, masses)
-    for each in found.threats:
-        found.threat_row(each, [required])
-    return found, address_of(png_of(screening_picture(scenario, layout, found), _DPI))
+    rings = png_of(screening_picture(scenario, layout, found), _DPI)
+    parts = screening_answer(scenario, layout, found, [required])
+    return Document.of([*parts, Picture("stand-offs as rings", rings)])

@@ -25,7 +25,7 @@ from blast_env.geometry import Layout
 from blast_env.site import Scenario
 
 _CELLS: Final[dict[Cells, str]] = {
-    0.25: "cells of 0.25 m: final results, with the error of the cells",
+    0.25: "cells of 0.25 m: final results, with the grid error",
     "fine": "fine growing cells: the same on sites of 40 m and more",
     0.5: "cells of 0.5 m: a look in a tenth of the time",
     "coarse": "coarse growing cells: the same on sites of 40 m and more",

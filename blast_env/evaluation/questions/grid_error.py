@@ -1,4 +1,4 @@
-"""The error of the cells: Roache's grid convergence index of loads and reductions.
+"""The grid error: Roache's grid convergence index of loads and reductions.
 
 Final statements run on fine cells, and once more, for the worst charge, on cells twice as large.
 The index of a number f of both runs is
@@ -16,7 +16,7 @@ error of the model nor the spread of charges.
 
 from dataclasses import dataclass
 from math import nan
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.blasts import Blasts, NumberOf
@@ -58,7 +58,7 @@ def convergence_index(
 
 @dataclass(frozen=True, eq=False)
 class GridError:
-    """The error of the cells of numbers of a layout under one charge.
+    """The grid error of numbers of a layout under one charge.
 
     Attributes:
         threat: The charge.
@@ -126,6 +126,53 @@ class GridError:
     def _share(self, side: int, number_of: NumberOf) -> float:
         fine, coarse = number_of(self.fine[side]), number_of(self.coarse[side])
         return convergence_index(fine, coarse, self.ratio) / fine if fine > 0.0 else nan
+
+
+class Effect(NamedTuple):
+    """A number of a blast with a layout and without a barrier; errors are NaN with one size.
+
+    Attributes:
+        value: With the layout.
+        unprotected: Without a barrier.
+        reduction: Share that is gone; NaN without a load.
+        error: Grid error of `value`, in its unit.
+        unprotected_error: That of `unprotected`.
+        reduction_error: That of `reduction`, an absolute share.
+    """
+
+    value: float
+    unprotected: float
+    reduction: float
+    error: float = nan
+    unprotected_error: float = nan
+    reduction_error: float = nan
+
+    @classmethod
+    def of(cls, blasts: Blasts, number_of: NumberOf, number: int) -> Self:
+        """Return the effect of the layout in question under a threat, by its number."""
+        pair = blasts.pairs(blasts.judged)[number]
+        return cls.between(pair, number_of, GridError.of(blasts, number=number))
+
+    @classmethod
+    def between(
+        cls,
+        pair: tuple[BlastRecord, BlastRecord],
+        number_of: NumberOf,
+        error: GridError | None,
+    ) -> Self:
+        """Return the effect between the records with a layout and without a barrier."""
+        value, unprotected = map(number_of, pair)
+        gone = reductions(value, unprotected).item()
+        if error is None:
+            return cls(value, unprotected, gone)
+        return cls(
+            value,
+            unprotected,
+            gone,
+            error.of_load(number_of) * value,
+            error.of_unprotected(number_of) * unprotected,
+            error.of_reduction(number_of),
+        )
 
 
 def impulse_of(record: BlastRecord) -> float:

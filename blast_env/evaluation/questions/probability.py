@@ -109,7 +109,7 @@ class Uncertainty:
             0.06 of Kingery and Bulmash's (docs/engineers/gas.md).
         in_shade: Its error on other bays: the spread of the experiments behind corners, 0.10 of
             0.57, among which its means are.
-        cells: Half the width of the 95 % interval of the error of the cells, as a share.
+        cells: Half the width of the 95 % interval of the grid error, as a share.
         panels: Scatter of the resistance of wall panels; an assumption of this project.
     """
 
@@ -122,7 +122,7 @@ class Uncertainty:
 
     @classmethod
     def of(cls, mass: float, error: GridError | None) -> "Uncertainty":
-        """Return the uncertain quantities with the error of the cells of the impulse, if known."""
+        """Return the uncertain quantities with the grid error of the impulse, if known."""
         share = nan if error is None else error.of_load(impulse_of)
         return cls(mass=mass, cells=0.0 if isnan(share) else share)
 

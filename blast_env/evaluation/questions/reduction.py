@@ -1,4 +1,4 @@
-"""Layouts compared with no barrier on the same threats: loads, reductions, tables and plain data.
+"""Layouts compared with no barrier: loads, reductions, tables and plain data.
 
 A reduction is NaN where the load without a barrier is 0. A comparison of layouts is refused for a
 case in which no threat causes a load without a barrier (`check_something_arrives`).
@@ -58,8 +58,8 @@ STRUCTURE_COLUMNS: Final = (
     Column("reduction", "", "of the calibrated impulse"),
     Column("reduction_low", "", "lower end of its 95 % confidence interval"),
     Column("reduction_high", "", "upper end of its 95 % confidence interval"),
-    Column("reduction_error", "", "error of the cells of the reduction; particles have none"),
-    Column("impulse_error_pa_s", "Pa s", "error of the cells of the impulse with the barrier"),
+    Column("reduction_error", "", "grid error of the reduction; particles have none"),
+    Column("impulse_error_pa_s", "Pa s", "grid error of the impulse with the barrier"),
     Column("unprotected_impulse_error_pa_s", "Pa s", "the same without it"),
     Column(
         "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
@@ -245,7 +245,7 @@ class Evaluation:
 
     @cached_property
     def grid_error(self) -> GridError | None:
-        """Error of the cells, from the threat with the largest load; `None` without one."""
+        """Grid error, from the threat with the largest load; `None` without one."""
         found = (GridError.of(each) for each in self.every)
         return next((each for each in found if each is not None), None)
 
@@ -315,7 +315,7 @@ class Evaluation:
 
     @property
     def reduction_error(self) -> float:
-        """Error of the cells of the reduction, as under the worst threat; NaN without one."""
+        """Grid error of the reduction, as under the worst threat; NaN without one."""
         if self.grid_error is None:
             return np.nan
         own = next(each for each in self.every if each.coarse is not None)
@@ -329,7 +329,7 @@ class Evaluation:
 
     @property
     def objective_error(self) -> float:
-        """Error of the cells of the objective of the first case, as `mean_error`."""
+        """Grid error of the objective of the first case, as `mean_error`."""
 
         def share(error: GridError) -> float:
             return error.of_load(
@@ -342,7 +342,7 @@ class Evaluation:
 
     @property
     def mean_error(self) -> float:
-        """Error of the cells of `mean`, the share as under the worst threat; NaN without one."""
+        """Grid error of `mean`, the share as under the worst threat; NaN without one."""
         return self._error(self.mean.value, lambda error: error.of_load(self.blasts.objective_of))
 
     @property
@@ -558,7 +558,7 @@ class Evaluation:
         }
 
     def _grid_error_record(self) -> dict[str, Any] | None:
-        """Return the errors of the cells as JSON-compatible data; `None` without any."""
+        """Return the grid errors as JSON-compatible data; `None` without any."""
         error = self.grid_error
         if error is None:
             return None

@@ -19,7 +19,6 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.evaluation.standing import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
@@ -51,17 +50,6 @@ LEFT_OUT: Final = (
 )
 """What screening does not know."""
 
-THREAT_HEADERS: Final = (
-    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
-    *("level", "panes broken", "pane (GSA, ISO)", "panel", "verdict"),
-)
-"""Headers of `Screening.threat_row`."""
-
-STAND_OFF_HEADERS: Final = (
-    *("component", "high, GSA 1, ISO A", "medium, 2, B", "low, 3a, D", "very low, 3b, E"),
-)
-"""Headers of `Screening.stand_off_rows`."""
-
 _LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
 _APART_M: Final = 2.0
 _MOST_PLACES: Final = 300
@@ -70,7 +58,7 @@ _DISTANCES: Final = 400  # of stand-offs, each 0.8 % farther than the last
 
 
 @dataclass(frozen=True)
-class ScreenedBay:
+class BayScreening:
     """A bay under one charge.
 
     Attributes:
@@ -91,7 +79,7 @@ class ScreenedBay:
 
 
 @dataclass(frozen=True)
-class ScreenedThreat:
+class ThreatScreening:
     """The worst place of one threat.
 
     Attributes:
@@ -104,7 +92,7 @@ class ScreenedThreat:
     name: str
     charge: Charge
     places: int
-    bays: tuple[ScreenedBay, ...]
+    bays: tuple[BayScreening, ...]
 
     @property
     def nearest_m(self) -> float:
@@ -172,7 +160,7 @@ class Screening:
         storey_m: The most frequent height of a storey, the span of walls.
     """
 
-    threats: tuple[ScreenedThreat, ...]
+    threats: tuple[ThreatScreening, ...]
     components: Mapping[str, Glazing | Wall]
     present: frozenset[str]
     storey_m: float
@@ -184,31 +172,6 @@ class Screening:
             each.name: stand_offs(self.components, each.charge, self.storey_m)
             for each in self.threats
         }
-
-    def threat_row(
-        self, threat: ScreenedThreat, required: Sequence[Requirement]
-    ) -> tuple[str, ...]:
-        """Return the row of a threat under some requirements; see `THREAT_HEADERS`."""
-        kept = all(threat.keeps(each) for each in required)
-        needed_m = max(self.needed_m(threat.name, each) for each in required)
-        x_m, y_m = threat.charge.position_m
-        return (
-            threat.name,
-            f"({x_m:.1f}, {y_m:.1f})",
-            f"{threat.charge.tnt_kg:g}",
-            f"{threat.nearest_m:.1f}",
-            self.stand_offs[threat.name][0].in_words(needed_m),
-            *threat.words,
-            Verdict.of(kept).word().lower() + threat.doubts(required),
-        )
-
-    def stand_off_rows(self, threat: ScreenedThreat) -> Iterator[tuple[str, ...]]:
-        """Yield the rows of the components under a threat; see `STAND_OFF_HEADERS`."""
-        for each in self.stand_offs[threat.name]:
-            kind = "wall" if isinstance(each.component, Wall) else "glass"
-            mark = " *" if each.name in self.present else ""
-            cells = (each.in_words(each.distances_m[level]) for level in _LEVELS)
-            yield f"{kind}: {each.name}{mark}", *cells
 
     def needed_m(self, threat: str, requirement: Requirement) -> float:
         """Return the stand-off at which all components of the site keep a requirement."""
@@ -447,7 +410,7 @@ def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
     return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
 
 
-def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) -> ScreenedThreat:
+def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) -> ThreatScreening:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
     _, tnt_kg, height_m = places[0]
     peaks, impulses = (in_the_open(each, ways, tnt_kg, height_m) for each in _LOADS)
@@ -463,8 +426,8 @@ def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) 
         load = float(peaks[worst, index]), float(impulses[worst, index])
         response = respond([filled], *triangle(*load))
         away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
-        bays.append(ScreenedBay(filled, float(away_m), bool(is_seen), *load, response))
-    return ScreenedThreat(name, places[worst], len(places), tuple(bays))
+        bays.append(BayScreening(filled, float(away_m), bool(is_seen), *load, response))
+    return ThreatScreening(name, places[worst], len(places), tuple(bays))
 
 
 def _tabulated(

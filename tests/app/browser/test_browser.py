@@ -538,7 +538,7 @@ def test_from_a_public_extract_to_the_verdict(page: Page) -> None:
     page.choose("wall panels", "reinforced concrete wall, 200 mm")
     reached("the site with its windows and walls")
     page.button("Screening").click()
-    page.sees("worst place of each threat by damage", 300.0)
+    page.sees("worst place by damage", 300.0)
     reached("stand-offs")
     page.choose("gas dynamics", "coarse growing cells")
     page.button("Propose").click()

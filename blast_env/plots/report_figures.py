@@ -1,17 +1,16 @@
 """The pictures of a report, as PNG."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.engines.gas import GasBlast, RecordedBlast
-from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.evaluation.questions.verdict import BuildingResponse, response_to
 from blast_env.gas.engine import Recorders
-from blast_env.geometry import Layout, Rectangle
+from blast_env.geometry import Element, Layout
 from blast_env.plots.facade import facade_picture
 from blast_env.plots.figures import png_of
 from blast_env.plots.gas import KINDS, facades
@@ -45,9 +44,6 @@ with render_extra():
 _DOTS_PER_IN: Final = 150
 _WIDTH_IN: Final = 6.5  # letters of 10 points stay legible where A4 leaves a figure its height
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
-
-Picture = tuple[str, bytes]
-"""A caption, and a PNG."""
 
 
 def png(figure: Figure) -> bytes:
@@ -85,47 +81,58 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
 # A threat.
 
 
+class Drawn(NamedTuple):
+    """A picture of a threat.
+
+    Attributes:
+        caption: Its caption.
+        png: The picture as PNG.
+        is_facade: Whether it shows the damage of unfolded facades.
+    """
+
+    caption: str
+    png: bytes
+    is_facade: bool = False
+
+
 class ThreatPictures:
-    """Draws a threat: first without the layout, then with it, while both results are in memory."""
+    """Draws a threat: first without the layout, then with it, while both results are in memory.
+
+    Attributes:
+        pictures: Once both are there: the damage, the risk, and the loads of both blasts.
+    """
 
     def __init__(self) -> None:
-        self._drawn: list[RecordedBlast] = []
+        self._unprotected: RecordedBlast | None = None
+        self.pictures: tuple[Drawn, ...] = ()
 
     def recorders(self, _: GasBlast) -> Recorders:
         """Return what makes the recorders of the ground."""
         return ground_recorders
 
     def draw(self, found: RecordedBlast) -> None:
-        """Keep a blast until `pictures`."""
-        self._drawn.append(found)
-
-    def pictures(self, blasts: Blasts) -> tuple[Picture, ...]:
-        """Return the pictures of the damage, the risk, and the loads of both blasts."""
-        unprotected, protected = self._drawn
-        sides = (consequences_of(blasts, name) for name in blasts.layouts)
-        return (
-            *damage_pictures(*sides),
-            risk_picture(unprotected, protected),
-            *blast_pictures(unprotected, protected),
-        )
+        """Keep the first blast until the second one, and draw both."""
+        if self._unprotected is None:
+            self._unprotected = found
+            return
+        both, self._unprotected = (self._unprotected, found), None
+        self.pictures = (*damage_pictures(*both), risk_picture(*both), *blast_pictures(*both))
 
 
-def blast_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> tuple[Picture, ...]:
-    """Return the unfolded facades of the protected buildings, and the histories on them."""
-    pictures: list[Picture] = []
+def blast_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Iterator[Drawn]:
+    """Yield the unfolded facades of the protected buildings, and the histories on them."""
     structures = protected.result.blast.scenario.structures
     for name, parts in buildings_of(structures).items():
         known = name in protected.record.complete.buildings
-        if not (known and any(each.protected for each in parts)):
+        if not (known and any(part.protected for part in parts)):
             continue
-        pictures.append(_history(unprotected, protected, name))
+        yield _history(unprotected, protected, name)
         for quantity, kind in KINDS.items():
             figure = facades(protected.result, name, quantity, unprotected.result)
-            pictures.append((f"{name}: {kind.name}, walls unfolded", png(figure)))
-    return tuple(pictures)
+            yield Drawn(f"{name}: {kind.name}, walls unfolded", png(figure))
 
 
-def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str) -> Picture:
+def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str) -> Drawn:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
     wall = unprotected.record.complete.buildings[building].wall
     figure, axes = _page(2.6)
@@ -149,26 +156,30 @@ def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9, frameon=False)
-    return f"{building}: overpressure over time, mean over its {wall} wall", png(figure)
+    return Drawn(f"{building}: overpressure over time, mean over its {wall} wall", png(figure))
 
 
-def damage_pictures(unprotected: Consequences, protected: Consequences) -> tuple[Picture, ...]:
-    """Return pictures of the damage to facades under one threat, without the layout and with it.
+def damage_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Iterator[Drawn]:
+    """Yield pictures of the damage to facades, without the layout and with it.
 
     They are the unfolded facades and the pressure-impulse diagram of each building.
     """
-    pictures: list[Picture] = []
-    for first, second in zip(unprotected.responses, protected.responses, strict=True):
-        name = second.building
-        rows = list(zip(("no barrier", "layout"), (first, second), strict=True))
-        pictures.append((f"{name}: facades unfolded", png(facade_picture(rows, name))))
-        points = [(each, response.facade) for each, response in rows]
+    words = "no barrier", "layout"
+    for own in zip(_responses(unprotected), _responses(protected), strict=True):
+        name, rows = own[0].building, list(zip(words, own, strict=True))
+        yield Drawn(f"{name}: facades unfolded", png(facade_picture(rows, name)), is_facade=True)
+        points = [(side, response.facade) for side, response in rows]
         diagram = pressure_impulse_diagram(points, name)
-        pictures.append((f"{name}: pressure-impulse diagram", png(diagram)))
-    return tuple(pictures)
+        yield Drawn(f"{name}: pressure-impulse diagram", png(diagram))
 
 
-def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Picture:
+def _responses(found: RecordedBlast) -> tuple[BuildingResponse, ...]:
+    blast = found.result.blast
+    charge = found.result.run.site.charge
+    return response_to(blast.scenario, tuple(blast.layout), charge, found.record).responses
+
+
+def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Drawn:
     """Return the map of risk to windows and eardrums.
 
     The map without the layout stands beside it if the charge is at the same place in both.
@@ -176,26 +187,27 @@ def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Pictur
     charges = (unprotected.result.run.site.charge, protected.result.run.site.charge)
     beside = unprotected.result if charges[0] == charges[1] else None
     figure = threshold_map(protected.result, beside)
-    return "risk to windows and eardrums, for the choice of assembly points", png(figure)
+    return Drawn("risk to windows and eardrums, for the choice of assembly points", png(figure))
 
 
 # The worth of items.
 
 
-def worth_map(scenario: Scenario, items: Sequence[tuple[Rectangle, float]]) -> bytes:
+def worth_map(scenario: Scenario, worths: Sequence[tuple[Element, float]]) -> bytes:
     """Return the layout with every module or piece in the colour of its worth."""
     figure, axes = _page(_WIDTH_IN)
     features = without(site_features(scenario), Kinds.CHARGE_PLACE)
     draw_plan(axes, features)
-    worths = 100.0 * np.array([worth for _, worth in items])
-    reach = max(float(np.abs(worths).max()), 1e-6)
+    points = 100.0 * np.array([worth for _, worth in worths])
+    reach = max(float(np.abs(points).max()), 1e-6)
     scale = TwoSlopeNorm(0.0, -reach, reach)
-    squares = [rectangle_patch(rectangle_m) for rectangle_m, _ in items]
+    sides_m = [scenario.zone.element_rectangle_m(element) for element, _ in worths]
+    squares = [rectangle_patch(rectangle_m) for rectangle_m in sides_m]
     modules = PatchCollection(squares, cmap="PuOr", norm=scale, edgecolor=unit_interval(INK))
-    modules.set_array(worths)
+    modules.set_array(points)
     modules.set(linewidth=0.5, zorder=5)
     axes.add_collection(modules)
-    sides = np.array([rectangle_m for rectangle_m, _ in items])
+    sides = np.array(sides_m)
     low, high = sides[:, :2].min(axis=0), sides[:, 2:].max(axis=0)
     reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
     (left, bottom), (right, top) = low - reach_m, high + reach_m

@@ -1,4 +1,4 @@
-"""The charges of a report: the worst places, and other places."""
+"""Places of charges: the worst ones as threats, and others."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.evaluation import LoadCase
 from blast_env.evaluation.blasts import Severity
+from blast_env.evaluation.cases import LoadCase
 from blast_env.geometry import Layout, Rectangle
 from blast_env.site import (
     AnyCharge,

@@ -1,84 +1,89 @@
 """Checks of a report that a reviewer can repeat by hand, each with all of its numbers."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 import numpy as np
 
+from blast_env.answers.document import AnyPart, Line, Section, lines
 from blast_env.curves import CURVES_SCALED_M, Load, air_share, normally_reflected
-from blast_env.report.study import Study
+from blast_env.evaluation.study import Study
+from blast_env.geometry import Rectangle
+from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
+from blast_env.layout import LayoutState
+from blast_env.response.components import Glazing
 from blast_env.response.facade import FacadeResponse
 from blast_env.response.sdof import impulses
+from blast_env.site.structures import buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 _INTERVALS: Final = 6
 
 
-@dataclass(frozen=True)
-class HandCheck:
-    """A check by hand.
-
-    Attributes:
-        title: What is checked, and against which source.
-        lines: The numbers, in the order of the calculation.
-    """
-
-    title: str
-    lines: tuple[str, ...]
-
-
-def checks_of(study: Study) -> tuple[HandCheck, ...]:
-    """Return the checks of a report: a stand-off, an impulse, a pane and the cost.
+def checks_of(study: Study) -> Section:
+    """Return the checks: a stand-off, an impulse, a pane and the cost.
 
     Impulse and pane need a building with a facade.
     """
     found = [_stand_off(study)]
     if study.unprotected.responses:
-        facade = study.unprotected.responses[0].on_cells
-        found.append(HandCheck("Impulse of a bay: sum of mean pressure times time", _sum(facade)))
-        found += _pane(facade)
-    found.append(HandCheck("Cost: number times unit cost", tuple(_cost(study))))
-    return tuple(found)
-
-
-def _stand_off(study: Study) -> HandCheck:
-    threat = study.threats[0]
-    charge = threat.charge_against(study.scenario)
-    target = min(
-        (each for each in study.targets if each.protected),
-        key=lambda each: each.bounds_m.distance_to(charge.position_m),
+        found += _of_facade(study.unprotected.responses[0].on_cells)
+    return Section.of(
+        "Checks by hand", *found, _check("Cost: number times unit cost", _cost(study))
     )
-    away_m = target.bounds_m.distance_to(charge.position_m)
+
+
+def _check(title: str, texts: Iterable[str]) -> Iterator[AnyPart]:
+    """Yield a check: what against which source, and the numbers in the order of calculation."""
+    yield Line.of(title, kind="head")
+    yield from lines(texts, "item")
+
+
+def _stand_off(study: Study) -> Iterator[AnyPart]:
+    threat, scenario = study.threats[0], study.scenario
+    charge = threat.charge_against(scenario)
+    outlines = {
+        name: Rectangle.around([part.rectangle_m for part in parts])
+        for name, parts in buildings_of(scenario.structures).items()
+        if any(part.protected for part in parts)
+    }
+    distances_m = {
+        name: outline.distance_to(charge.position_m) for name, outline in outlines.items()
+    }
+    building = min(distances_m, key=distances_m.__getitem__)
+    away_m = distances_m[building]
     scale = float(np.cbrt(charge.tnt_kg))
-    lines = [
+    texts = [
         f"{threat.name}: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:g},"
-        f" {charge.position_m[1]:g}) m, {away_m:.2f} m from the outline of {target.name}",
+        f" {charge.position_m[1]:g}) m, {away_m:.2f} m from the outline of {building}",
         f"Z = {away_m:.2f} m / ({charge.tnt_kg:g} kg)^(1/3) = {away_m / scale:.2f} m/kg^(1/3)",
     ]
     if CURVES_SCALED_M[0] <= away_m / scale <= CURVES_SCALED_M[1]:
-        loads: tuple[Load, Load] = ("overpressure", "impulse")
+        quantities: tuple[Load, Load] = ("overpressure", "impulse")
         peak_pa, impulse_pa_s = (
-            float(normally_reflected(each, np.array(away_m), charge.tnt_kg, charge.height_m))
-            for each in loads
+            float(normally_reflected(load, np.array(away_m), charge.tnt_kg, charge.height_m))
+            for load in quantities
         )
         in_air = float(air_share(charge.height_m, charge.tnt_kg))
         burst = "hemispherical" if in_air < 1.0 else "free air and its mirror image in the ground"
         if 0.0 < in_air < 1.0:
             burst = f"between hemispherical and free air with its mirror image, {in_air:.2f}"
-        fine = next(
-            each.unprotected
-            for each in study.fine
-            if (each.target.name, each.threat.name) == (target.name, threat.name)
-        )
-        lines += [
+        load = study.blasts.records[study.blasts.unprotected][0].complete.buildings[building]
+        texts += [
             f"Kingery and Bulmash, {burst}, normal reflection: {peak_pa / PA_PER_KPA:,.1f} kPa,"
             f" {impulse_pa_s:,.0f} Pa s",
             f"gas, most loaded wall without the layout, mean over the wall:"
-            f" {fine.wall_impulse_pa_s:,.0f} Pa s; largest peak {fine.peak_pa / PA_PER_KPA:,.1f}"
+            f" {load.wall_impulse_pa_s:,.0f} Pa s; largest peak {load.peak_pa / PA_PER_KPA:,.1f}"
             " kPa",
         ]
-    return HandCheck("Stand-off and load in the open: UFC 3-340-02, chapter 2", tuple(lines))
+    return _check("Stand-off and load in the open: UFC 3-340-02, chapter 2", texts)
+
+
+def _of_facade(facade: FacadeResponse) -> Iterator[Iterator[AnyPart]]:
+    yield _check("Impulse of a bay: sum of mean pressure times time", _sum(facade))
+    glazing = next((bay.glazing for bay in facade.bays if bay.glazing is not None), None)
+    if glazing is not None:
+        yield _check("Load resistance of a pane: charts of ASTM E1300", _pane(glazing))
 
 
 def _sum(facade: FacadeResponse) -> tuple[str, ...]:
@@ -101,26 +106,24 @@ def _sum(facade: FacadeResponse) -> tuple[str, ...]:
     )
 
 
-def _pane(facade: FacadeResponse) -> Iterator[HandCheck]:
-    glazing = next((each.glazing for each in facade.bays if each.glazing is not None), None)
-    if glazing is None:
-        return
+def _pane(glazing: Glazing) -> tuple[str, ...]:
     pane = glazing.pane
     load_kpa = pane.load_resistance_pa() / PA_PER_KPA
-    lines = (
+    return (
         f"{glazing.title}: {pane.width_m:g} x {pane.height_m:g} m, least thickness"
         f" {glazing.thickness_mm:g} mm, four sides held, 3 s, 8 of 1,000 break",
         f"non-factored load from the chart times the glass type factor {pane.kind.type_factor:g}"
         + (" and the share of the other pane" if pane.outer_thickness_m else "")
         + f"; here {load_kpa:.2f} kPa",
     )
-    yield HandCheck("Load resistance of a pane: charts of ASTM E1300", lines)
 
 
 def _cost(study: Study) -> Iterator[str]:
-    lines = study.bill.to_dict("records")
-    for line in lines[:-1]:
+    bill = bill_of_quantities(LayoutPlan(study.scenario, study.layout))
+    *items, total = bill.to_dict("records")
+    for line in items:
         unit = line["unit_cost"]
         known = "" if unit != unit else f" x {unit:,.10g}"  # NaN without a unit cost
         yield f"{line['item']}: {line['count']}{known} = {line['cost']:,.10g}"
-    yield f"sum {lines[-1]['cost']:,.10g}; cost of the layout {study.cost:,.10g}"
+    cost = LayoutState.of(study.scenario, study.layout).cost
+    yield f"sum {total['cost']:,.10g}; cost of the layout {cost:,.10g}"

@@ -1,0 +1,84 @@
+"""The answer of screening: the worst place of each threat, and the stand-offs of components."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from blast_env.answers.document import AnyPart, Line, Table
+from blast_env.evaluation.questions.screening import LEFT_OUT, Screening, ThreatScreening
+from blast_env.evaluation.questions.verdict import Consequences, Verdict
+from blast_env.geometry import Layout, layout_counts
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Wall
+from blast_env.response.facade import response_words
+from blast_env.response.requirements import Requirement
+from blast_env.site import Scenario
+
+_THREATS: Final = (
+    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
+    *("level", "panes broken", "pane (GSA, ISO)", "panel", "verdict"),
+)
+_STAND_OFFS: Final = (
+    *("component", "high, GSA 1, ISO A", "medium, 2, B", "low, 3a, D", "very low, 3b, E"),
+)
+_LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
+
+
+def screening_answer(
+    scenario: Scenario,
+    layout: Layout,
+    found: Screening,
+    required: Sequence[Requirement],
+    gas: Mapping[str, Consequences] | None = None,
+) -> Iterator[AnyPart]:
+    """Yield the level of protection of facades, and the stand-off that each level needs.
+
+    Args:
+        scenario: The site.
+        layout: The layout.
+        found: Its screening.
+        required: The requirements.
+        gas: The consequences of each worst place by gas dynamics, by the name of the threat.
+    """
+    yield Line.of(f"required: {'; '.join(requirement.words for requirement in required)}")
+    rows = []
+    for threat in found.threats:
+        rows.append(_threat_row(found, threat, required))
+        if gas:
+            own = gas[threat.name]
+            words = response_words([response.facade for response in own.responses])
+            rows.append(("  by gas", *[""] * 4, *words, "flagged" if own.is_flagged else ""))
+    behind = layout_counts(layout, "barrier") if layout else "no barrier"
+    title = f"{scenario.name}, {behind}: worst place by damage"
+    yield Table.of(title, _THREATS, rows, 2)
+    for threat in found.threats:
+        title = (
+            f"stand-off (m) from which a component allows a level, {threat.name},"
+            f" {threat.charge.tnt_kg:g} kg TNT (* on this site)"
+        )
+        yield Table.of(title, _STAND_OFFS, _stand_off_rows(found, threat))
+    yield Line.of(LEFT_OUT, kind="quiet")
+
+
+def _threat_row(
+    found: Screening, threat: ThreatScreening, required: Sequence[Requirement]
+) -> tuple[str, ...]:
+    kept = all(threat.keeps(requirement) for requirement in required)
+    needed_m = max(found.needed_m(threat.name, requirement) for requirement in required)
+    x_m, y_m = threat.charge.position_m
+    return (
+        threat.name,
+        f"({x_m:.1f}, {y_m:.1f})",
+        f"{threat.charge.tnt_kg:g}",
+        f"{threat.nearest_m:.1f}",
+        found.stand_offs[threat.name][0].in_words(needed_m),
+        *threat.words,
+        Verdict.of(kept).word().lower() + threat.doubts(required),
+    )
+
+
+def _stand_off_rows(found: Screening, threat: ThreatScreening) -> Iterator[tuple[str, ...]]:
+    for own in found.stand_offs[threat.name]:
+        kind = "wall" if isinstance(own.component, Wall) else "glass"
+        mark = " *" if own.name in found.present else ""
+        cells = (own.in_words(own.distances_m[level]) for level in _LEVELS)
+        yield f"{kind}: {own.name}{mark}", *cells
