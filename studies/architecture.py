@@ -1,7 +1,9 @@
-"""The picture of the package's rooms: `python -m studies.architecture docs/pictures/rooms.png`.
+"""The pictures of the package's rooms, and of the road from a blast to an answer.
+
+    python -m studies.architecture docs/pictures/rooms.png --road docs/pictures/road.png
 
 Layers come from the contract that `make lint` checks (pyproject.toml), titles from the first lines
-of the rooms' docstrings.
+of docstrings, questions and answers from their folders.
 """
 
 import ast
@@ -59,8 +61,13 @@ def rooms() -> list[Room]:
 def _room(name: str) -> Room:
     files = sorted((PACKAGE / name).rglob("*.py"))
     lines = sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files)
-    module = ast.parse((PACKAGE / name / "__init__.py").read_text(encoding="utf-8"))
-    return Room(name, (ast.get_docstring(module) or "").partition("\n")[0].rstrip("."), lines)
+    return Room(name, _title(PACKAGE / name / "__init__.py"), lines)
+
+
+def _title(path: Path) -> str:
+    """Return the first line of the docstring of a file."""
+    module = ast.parse(path.read_text(encoding="utf-8"))
+    return (ast.get_docstring(module) or "").partition("\n")[0].rstrip(".")
 
 
 def picture(shown: list[Room]) -> Figure:
@@ -88,12 +95,75 @@ def picture(shown: list[Room]) -> Figure:
     return figure
 
 
-def main(out: Annotated[Path, typer.Argument(help="The picture: .png, .svg or .pdf.")]) -> None:
-    """Draw the rooms of the package."""
+ROAD: Final = (
+    ("evaluation/campaign.py",),
+    ("evaluation/record.py", "evaluation/store.py"),
+    ("evaluation/blasts.py",),
+    ("evaluation/questions",),
+    ("answers",),
+    ("answers/terminal.py", "answers/html.py", "answers/page.py"),
+)
+"""The steps of the road: a file each, or all files of a folder that no other step names."""
+
+
+def road() -> list[list[tuple[str, str]]]:
+    """Return the steps of the road, each with its files and the first lines of their docstrings."""
+    named = {name for step in ROAD for name in step}
+    steps = []
+    for step in ROAD:
+        paths = [PACKAGE / name for name in step]
+        if paths[0].is_dir():
+            own = (*paths[0].glob("*.py"), *paths[0].glob("*/__init__.py"))
+            paths = sorted(path for path in own if path != paths[0] / "__init__.py")
+        shown = [path.relative_to(PACKAGE).as_posix() for path in paths]
+        steps.append(
+            [
+                (name.removesuffix("/__init__.py").removesuffix(".py"), _title(PACKAGE / name))
+                for name in shown
+                if paths[0].name in step[0] or name not in named
+            ]
+        )
+    return steps
+
+
+def road_picture(steps: list[list[tuple[str, str]]]) -> Figure:
+    """Return the picture of the road: a box a step, with its files and what they do."""
+    heights = [len(step) for step in steps]
+    rows = sum(heights) + len(steps) - 1
+    figure = Figure(figsize=(8.5, _ROW_IN * 0.9 * rows + 0.3))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, 100.0), ylim=(rows + 0.2, -0.7))
+    axes.axis("off")
+    top = 0.0
+    for number, step in enumerate(steps):
+        box = FancyBboxPatch(
+            (2.0, top - 0.5), 96.0, float(len(step)), boxstyle="round,pad=0,rounding_size=0.2"
+        )
+        box.set(facecolor="#e8eef4", edgecolor="#51667a")
+        axes.add_patch(box)
+        for row, (name, title) in enumerate(step):
+            axes.text(3.0, top + row, name, va="center", family="monospace", fontsize=8)
+            axes.text(36.0, top + row, shortened(title, _MOST_LETTERS), va="center", fontsize=8)
+        top += len(step)
+        if number < len(steps) - 1:
+            arrow = {"arrowstyle": "-|>", "color": "#51667a"}
+            axes.annotate("", (50.0, top + 0.5), (50.0, top - 0.5), arrowprops=arrow)
+        top += 1.0
+    return figure
+
+
+def main(
+    out: Annotated[Path, typer.Argument(help="The picture of the rooms: .png, .svg or .pdf.")],
+    road_out: Annotated[Path | None, typer.Option("--road", help="That of the road.")] = None,
+) -> None:
+    """Draw the rooms of the package, and the road from a blast to an answer."""
     with user_errors():
         shown = rooms()
         save_figure(picture(shown), out)
         print_line(f"{len(shown)} rooms, {sum(room.lines for room in shown):,} lines: {out}")
+        if road_out is not None:
+            save_figure(road_picture(road()), road_out)
+            print_line(f"{len(ROAD)} steps: {road_out}")
 
 
 if __name__ == "__main__":

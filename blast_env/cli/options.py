@@ -235,8 +235,11 @@ class GivenCharge:
         return charge
 
     def threats(self, scenario: Scenario, draws: int) -> tuple[LoadCase, ...]:
-        """Return drawn threats with the given place and mass, each place once."""
-        drawn = draw_threats(scenario, range(draws))
+        """Return drawn threats with the given place and mass, each place once.
+
+        Fixed charges come in turn, each once before any repeats.
+        """
+        drawn = in_turn(scenario, draw_threats(scenario, range(draws)))
         fixed = (replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn)
         return one_of_each_charge(fixed)
 

@@ -99,7 +99,7 @@ class BlastEvaluator:
         self.counts = BlastCounts() if counts is None else counts
         self.store = BlastStore.of(cache, cache_size)
         self._key_of_nothing = BlastKey(
-            scenario_hash=self.scenario.content_hash,
+            scenario_hash=self.scenario.without_budget.content_hash,
             layout=(),
             charge=Charge((0.0, 0.0), 0.0),
             seed=0,
@@ -112,7 +112,7 @@ class BlastEvaluator:
     @property
     def scenario_hash(self) -> str:
         """Content hash of the scenario, computed once."""
-        return self._key_of_nothing.scenario_hash
+        return self.scenario.content_hash
 
     @property
     def calibration_name(self) -> str:

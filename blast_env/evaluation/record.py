@@ -275,7 +275,7 @@ class BlastKey(NamedTuple):
     """All inputs that determine the record of a blast.
 
     Attributes:
-        scenario_hash: Content hash of the scenario.
+        scenario_hash: Content hash of the scenario without its budget, on which no load depends.
         layout: The layout's cells, sorted.
         charge: The charge at its place.
         seed: Seed of fan and air.
