@@ -1,8 +1,6 @@
 """The answers of `assess`: the verdict and what it rests on, capacity, screening, barriers."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 from math import nan
 from typing import Final
 
@@ -24,6 +22,7 @@ from blast_env.evaluation.questions.capacity import LEVELS, Edge, PlaceCapacity
 from blast_env.evaluation.questions.grid_error import (
     FACTOR,
     ORDER,
+    Effect,
     GridError,
     convergence_index,
     impulse_of,
@@ -32,6 +31,7 @@ from blast_env.evaluation.questions.probability import Uncertainty, level_probab
 from blast_env.evaluation.questions.verdict import (
     Consequences,
     Verdict,
+    consequences_by_layout,
     consequences_of,
     other_glazing,
     side_on_peak_pa,
@@ -40,7 +40,6 @@ from blast_env.evaluation.record import BlastRecord
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
-from blast_env.statistics import reductions
 from blast_env.values import count_of
 
 RESPONSE_HEADERS: Final = (
@@ -57,37 +56,9 @@ def governing(blasts: Blasts) -> int:
     return consequences_of(blasts).worst_number
 
 
-@dataclass(frozen=True, eq=False)
-class Assessed:
-    """The consequences of blasts with each layout, and their grid errors.
-
-    Attributes:
-        blasts: The blasts, on coarser cells under the charge that governs.
-    """
-
-    blasts: Blasts
-
-    @cached_property
-    def found(self) -> dict[str, Consequences]:
-        """The consequences with each layout, no barrier first."""
-        return {name: consequences_of(self.blasts, name) for name in self.blasts.layouts}
-
-    @cached_property
-    def coarse(self) -> dict[str, Consequences]:
-        """The same under the charge that governs, on coarser cells; empty without these."""
-        coarse = self.blasts.coarse
-        if coarse is None:
-            return {}
-        return {name: consequences_of(coarse, name) for name in coarse.layouts}
-
-    @property
-    def judged(self) -> Consequences:
-        """The consequences with the layout in question."""
-        return self.found[self.blasts.judged]
-
-
 def assessment(
     blasts: Blasts,
+    found: Mapping[str, Consequences],
     target: LevelOfProtection,
     mass_error: float,
     required: Sequence[Requirement] = (),
@@ -96,52 +67,53 @@ def assessment(
 
     Args:
         blasts: The blasts, on coarser cells under the charge that governs.
+        found: Their consequences; see `consequences_by_layout`.
         target: Required level of protection.
         mass_error: Uncertainty of the masses; see `Uncertainty`.
         required: Further requirements.
     """
-    assessed, scenario = Assessed(blasts), blasts.scenario
-    yield from _verdict(assessed, target)
-    judged_first = [*assessed.found.items()][::-1]
+    scenario, judged = blasts.scenario, found[blasts.judged]
+    coarse = {} if blasts.coarse is None else consequences_by_layout(blasts.coarse)
+    yield from _verdict(blasts, judged, target)
+    judged_first = [*found.items()][::-1]
     for requirement in required:
-        for name, found in judged_first:
-            kept = all(requirement.kept_by(each.facade) for each in found.responses)
-            word = Verdict.of(kept).word(found.is_flagged).lower()
+        for name, own in judged_first:
+            kept = all(requirement.kept_by(response.facade) for response in own.responses)
+            word = Verdict.of(kept).word(own.is_flagged).lower()
             yield Line.of(f"{requirement.words}, {name}: {word}")
     error = GridError.of(blasts)
     uncertainty = Uncertainty.of(mass_error, error)
-    for name, found in judged_first:
-        likely = level_probability(found, uncertainty)
+    for name, own in judged_first:
+        likely = level_probability(own, uncertainty)
         yield Line.of(f"probability, {name}: {likely.words(target)}")
     if error is not None:
         yield from impulse_lines(error)
-        yield from lines(_levels_changed(assessed))
-    yield _buildings(assessed)
-    for name, found in [*assessed.found.items()][:-1]:
-        yield from lines((f"flag, {name}: {note}" for note in found.notes), "flag")
-    yield from _neighbours(assessed)
-    worst = assessed.judged.worst_barrier
+        yield from lines(_levels_changed(blasts, judged, coarse))
+    yield _buildings(blasts, found, coarse)
+    for name, own in [*found.items()][:-1]:
+        yield from lines((f"flag, {name}: {note}" for note in own.notes), "flag")
+    yield from _neighbours(blasts, found)
+    worst = judged.worst_barrier
     if worst is not None:
         title = f"the barrier under {charge_text(worst.charge)}, the worst"
         yield from pieces_answer(worst.pieces, title)
-    for barrier in assessed.judged.barriers:
+    for barrier in judged.barriers:
         if barrier.taken_away:
             yield Line.of(
                 f"{len(barrier.taken_away)} pieces overturned before the blast of "
                 f"{charge_text(barrier.charge)} was over, and were taken away for it"
             )
-    yield _glazing(scenario, assessed.judged, target)
+    yield _glazing(scenario, judged, target)
 
 
-def _verdict(assessed: Assessed, target: LevelOfProtection) -> Iterator[AnyPart]:
-    judged, blasts = assessed.judged, assessed.blasts
+def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) -> Iterator[AnyPart]:
     verdict, level = judged.verdict_word(target), judged.level_words_for(target)
     charges = count_of("charge", len(judged.barriers))
     words = f"{blasts.scenario.name}, {blasts.judged}: {verdict}: {level}, under {charges}"
     yield Line.of(words, kind="answer")
     for building in judged.buildings:
-        stood = judged.standing(building).words
-        yield Line.of(f"standing of the load that decides, {building}: {stood}")
+        status = judged.standing(building).words
+        yield Line.of(f"validation of the load that decides, {building}: {status}")
     yield from lines((f"flag: {note}" for note in judged.notes), "flag")
     if doubt := judged.doubt(target):
         yield Line.of(doubt)
@@ -159,36 +131,32 @@ def cells_words(error: GridError) -> str:
 def impulse_lines(error: GridError) -> Iterator[Line]:
     """Yield the impulse on the protected structures under the worst charge, and its error."""
     words = "impulse on the protected structures under the worst charge: "
-    protected, unprotected = (
-        Number(impulse_of(record), "Pa s", share * impulse_of(record))
-        for record, share in zip(
-            error.fine,
-            (error.of_load(impulse_of), error.of_unprotected(impulse_of)),
-            strict=True,
-        )
-    )
+    effect = Effect.between(error.fine, impulse_of, error)
+    protected = Number(effect.value, "Pa s", effect.error)
     if not error.layout:
         yield Line.of(words, protected)
     else:
-        gone = reductions(*map(impulse_of, error.fine)).item()
-        share = Number.reduction(gone, error.of_reduction(impulse_of))
+        unprotected = Number(effect.unprotected, "Pa s", effect.unprotected_error)
+        share = Number.reduction(effect.reduction, effect.reduction_error)
         sides = unprotected, " without barrier, ", protected, " with, reduction "
         yield Line.of(words, *sides, share)
     yield Line.of(cells_words(error), kind="quiet")
 
 
-def _levels_changed(assessed: Assessed) -> Iterator[str]:
+def _levels_changed(
+    blasts: Blasts, judged: Consequences, coarse: Mapping[str, Consequences]
+) -> Iterator[str]:
     """Yield levels that cells change under the worst charge."""
-    judged, coarse = assessed.judged, assessed.blasts.coarse
-    if coarse is None:
+    if blasts.coarse is None:
         return
     for building in judged.buildings:
-        fine = judged.of(building)[_coarse_number(assessed.blasts)].facade.level_of_protection
-        other = assessed.coarse[assessed.blasts.judged].level(building)
+        fine = judged.of(building)[_coarse_number(blasts)].facade.level_of_protection
+        other = coarse[blasts.judged].level(building)
         if other != fine:
+            words = blasts.coarse.engine.words
             yield (
-                f"note: {building} reaches level {other.label!r} with {coarse.engine.words}, "
-                f"and {fine.label!r} with the finer cells, under the worst charge"
+                f"note: {building} reaches level {other.label!r} with {words}, and {fine.label!r} "
+                "with the finer cells, under the worst charge"
             )
 
 
@@ -214,27 +182,28 @@ def response_cells(
     return whole.level, panes, whole.condition, whole.damage
 
 
-def _buildings(assessed: Assessed) -> Table:
-    blasts = assessed.blasts
+def _buildings(
+    blasts: Blasts, found: Mapping[str, Consequences], coarse: Mapping[str, Consequences]
+) -> Table:
     number = 0 if blasts.coarse is None else _coarse_number(blasts)
     rows = [
         (
             name,
             building_words(blasts.scenario, building),
-            *response_cells(found, building, assessed.coarse.get(name), number),
+            *response_cells(own, building, coarse.get(name), number),
         )
-        for name, found in assessed.found.items()
-        for building in found.buildings
+        for name, own in found.items()
+        for building in own.buildings
     ]
     title = f"{blasts.scenario.name}: the worst of all charges"
     return Table.of(title, ("layout", *RESPONSE_HEADERS), rows, 3)
 
 
-def _neighbours(assessed: Assessed) -> Iterator[AnyPart]:
-    blasts, rows = assessed.blasts, list[tuple[AnyCell, ...]]()
-    for name, found in assessed.found.items():
+def _neighbours(blasts: Blasts, found: Mapping[str, Consequences]) -> Iterator[AnyPart]:
+    rows = list[tuple[AnyCell, ...]]()
+    for name, own in found.items():
         error = GridError.of(blasts, name)
-        for worst in found.worst_neighbours:
+        for worst in own.worst_neighbours:
 
             def peak_of(record: BlastRecord, building: str = worst.building) -> float:
                 return side_on_peak_pa(np.array([record.complete.walls[building].peak_pa])).item()
@@ -250,7 +219,7 @@ def _neighbours(assessed: Assessed) -> Iterator[AnyPart]:
                     Number(
                         worst.impulse_pa_s, error=_off(error, reflected_of) * worst.impulse_pa_s
                     ),
-                    *(f"{100.0 * worst.probability[each]:.0f}" for each in BuildingDamage),
+                    *(f"{100.0 * worst.probability[damage]:.0f}" for damage in BuildingDamage),
                 )
             )
     if rows:
@@ -277,16 +246,16 @@ def _glazing(scenario: Scenario, judged: Consequences, target: LevelOfProtection
 def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Iterator[AnyPart]:
     """Yield the largest masses and the least stand-offs, one row per layout and place."""
     masses, stand_offs = list[tuple[str, ...]](), list[tuple[str, ...]]()
-    for each in found:
-        x_m, y_m = each.charge.position_m
-        place = each.layout, f"{x_m:.1f}, {y_m:.1f}"
-        masses.append((*place, f"{each.stand_off_m:.1f} m", *map(_mass_text, each.heavier)))
-        mass = f"{each.charge.tnt_kg:g} kg"
-        stand_offs.append((*place, mass, *map(_stand_off_text, each.nearer)))
-    blasts = sum(each.blasts for each in found)
+    for own in found:
+        x_m, y_m = own.charge.position_m
+        place = own.layout, f"{x_m:.1f}, {y_m:.1f}"
+        masses.append((*place, f"{own.stand_off_m:.1f} m", *map(_mass_text, own.heavier)))
+        mass = f"{own.charge.tnt_kg:g} kg"
+        stand_offs.append((*place, mass, *map(_stand_off_text, own.nearer)))
+    blasts = sum(own.blasts for own in found)
     yield Line.of(f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass")
     keeps = "that keeps each level of protection"
-    levels = [each.label for each in LEVELS]
+    levels = [level.label for level in LEVELS]
     for title, third, rows in (
         ("largest charge (kg TNT)", "stand-off", masses),
         ("least stand-off (m)", "charge", stand_offs),

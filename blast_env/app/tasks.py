@@ -154,6 +154,7 @@ class AnswerTask:
         # Here, as below, because they take long to import, and a blast needs none of them.
         from blast_env.answers.assess import assessment, capacity_answer, governing
         from blast_env.evaluation.questions.capacity import capacity
+        from blast_env.evaluation.questions.verdict import consequences_by_layout
 
         engine = GasEngine.with_cells(self.cells)
         layouts: dict[str, Layout] = {NO_BARRIER: ()}
@@ -164,7 +165,8 @@ class AnswerTask:
                 self.site, layouts, self.threats, engine, engine.coarser, self.cache
             )
             blasts = campaign.run(writer.share, worst=governing)
-            return assessment(blasts, self.target, self.mass_error)
+            found = consequences_by_layout(blasts)
+            return assessment(blasts, found, self.target, self.mass_error)
         evaluator, charges = (
             BlastEvaluator(self.site, engine, cache=self.cache),
             [each.charge for each in self.threats],

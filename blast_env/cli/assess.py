@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.answers.assess import Assessed, assessment, capacity_answer, governing
+from blast_env.answers.assess import assessment, capacity_answer, governing
 from blast_env.answers.document import charge_text
 from blast_env.answers.screening import screening_answer
 from blast_env.answers.terminal import print_line, print_parts
@@ -41,10 +41,10 @@ from blast_env.evaluation.questions.capacity import capacity as capacity_of
 from blast_env.evaluation.questions.screening import Screening
 from blast_env.evaluation.questions.screening import screen as screen_site
 from blast_env.evaluation.questions.verdict import (
-    BuildingResponse,
     Consequences,
     bay_table,
     check_facades,
+    consequences_by_layout,
     consequences_of,
 )
 from blast_env.geometry import Layout, layout_counts
@@ -170,11 +170,11 @@ def assess(
     with resumable(resume_words(cache)):
         with progress_bar(count_of("charge", len(drawn))) as progress:
             blasts = campaign.run(progress, worst=governing)
-        assessed = Assessed(blasts)
-        print_parts(assessment(blasts, level, mass_error, required))
+        found = consequences_by_layout(blasts)
+        print_parts(assessment(blasts, found, level, mass_error, required))
     if table is not None:
-        print_written([write_csv(bay_table(assessed.found), table)])
-    _draw(assessed, picture, diagram)
+        print_written([write_csv(bay_table(found), table)])
+    _draw(site, found, picture, diagram)
 
 
 def _capacity(
@@ -190,33 +190,30 @@ def _capacity(
     print_parts(capacity_answer(site, found))
 
 
-def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> None:
+def _draw(
+    scenario: Scenario,
+    found: Mapping[str, Consequences],
+    picture: Path | None,
+    diagram: Path | None,
+) -> None:
     """Draw the facades and the pressure-impulse diagram under the worst charge."""
-    rows = _worst_rows(assessed) if picture or diagram else []
-
-    def title() -> str:
-        building = rows[0][1].building
-        words = assessed.blasts.scenario.title_of(building)
-        return f"{words}: {charge_text(rows[0][1].charge)}, the worst"
+    *_, judged = found.values()
+    worst = max(judged.responses, key=lambda response: response.severity)
+    number = judged.responses.index(worst)
+    rows = [(name, own.responses[number]) for name, own in found.items()]
+    title = f"{scenario.title_of(worst.building)}: {charge_text(worst.charge)}, the worst"
 
     def facades() -> "Figure":
         from blast_env.plots.facade import facade_picture
 
-        return facade_picture(rows, title())
+        return facade_picture(rows, title)
 
     def pressure_impulse() -> "Figure":
         from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 
-        return pressure_impulse_diagram([(name, each.facade) for name, each in rows], title())
+        return pressure_impulse_diagram([(name, own.facade) for name, own in rows], title)
 
     print_written(save_figures((picture, facades), (diagram, pressure_impulse)))
-
-
-def _worst_rows(assessed: Assessed) -> list[tuple[str, BuildingResponse]]:
-    """Return the governing building and charge of the judged layout, one row per layout."""
-    responses = assessed.judged.responses
-    number = responses.index(max(responses, key=lambda each: each.severity))
-    return [(name, each.responses[number]) for name, each in assessed.found.items()]
 
 
 def _screen(

@@ -143,7 +143,7 @@ def _basis(study: Study) -> Iterator[str]:
     for name in study.protected.buildings:
         words = study.protected.standing(name).words
         title = study.scenario.title_of(name)
-        yield f"Validation status of the load that decides on {title}: {words}."
+        yield f"Validation of the load that decides on {title}: {words}."
     yield "Components and costs of the site file; frames and anchors hold."
 
 

@@ -519,6 +519,11 @@ def consequences_of(blasts: Blasts, name: str | None = None) -> Consequences:
     )
 
 
+def consequences_by_layout(blasts: Blasts) -> dict[str, Consequences]:
+    """Return the consequences with each layout, by its name, no barrier first."""
+    return {name: consequences_of(blasts, name) for name in blasts.layouts}
+
+
 def response_to(
     scenario: Scenario, layout: Layout, charge: Charge, record: BlastRecord
 ) -> Consequences:
