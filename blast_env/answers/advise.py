@@ -29,19 +29,19 @@ def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
     if error is not None:
         yield from impulse_lines(error)
     rows = []
-    for each in found.found:
-        seen = judge.judged[each.layout]
+    for own in found.found:
+        seen = judge.judged[own.layout]
         rows.append(
             (
-                str(each.kind),
-                layout_words(each.layout),
-                f"{LayoutState(scenario, each.layout).cost:,.10g}",
-                str(each.blasts),
+                str(own.kind),
+                layout_words(own.layout),
+                f"{LayoutState(scenario, own.layout).cost:,.10g}",
+                str(own.blasts),
                 min(seen.level(building) for building in seen.buildings).label,
-                "yes" if each.passes else "no",
+                "yes" if own.passes else "no",
                 Verdict.of(seen.passes_on_cells(target)).word(seen.is_flagged).lower(),
                 seen.verdict_word(target).lower(),
-                probability_text(judge.shares[each.layout], DRAWS),
+                probability_text(judge.shares[own.layout], DRAWS),
             )
         )
     zone = scenario.zone
@@ -60,7 +60,7 @@ def _first_line(found: AdviceResult, best: Advice) -> str:
     """Return the answer in a line or two: the cost to pass, and whether walls help."""
     judge = found.judge
     scenario, target = judge.scenario, judge.target
-    by_kind = {each.kind: each for each in found.found}
+    by_kind = {advice.kind: advice for advice in found.found}
     flagged = " (flagged)" if judge.judged[best.layout].is_flagged else ""
     wanted = scenario.objective.target_probability
     likely = probability_text(judge.shares[best.layout], DRAWS)

@@ -53,7 +53,7 @@ def comparison(
     rows = []
     for threat in threats:
         for name, (blasts, cost) in layouts.items():
-            numbers = [k for k, each in enumerate(blasts.threats) if each.name == threat]
+            numbers = [k for k, own in enumerate(blasts.threats) if own.name == threat]
             for number in numbers:
                 record = blasts.records[blasts.judged][number]
                 for title, parts in _shown(record.loads):
@@ -92,8 +92,8 @@ def _only(loads: BlastLoads, names: Collection[str]) -> BlastLoads:
     """
     if not names:
         return loads
-    parts = counted_parts([each for each in loads.structures if each.name in names])
-    return replace(loads, structures=tuple(replace(each, protected=True) for each in parts))
+    parts = counted_parts([structure for structure in loads.structures if structure.name in names])
+    return replace(loads, structures=tuple(replace(part, protected=True) for part in parts))
 
 
 def _shown(loads: BlastLoads) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -103,8 +103,8 @@ def _shown(loads: BlastLoads) -> Iterator[tuple[str, tuple[str, ...]]]:
     """
     yield "", ()
     parts: dict[str, list[str]] = {}
-    for each in loads.structures:
-        parts.setdefault(each.building, []).append(each.name)
+    for structure in loads.structures:
+        parts.setdefault(structure.building, []).append(structure.name)
     for name, own in parts.items():
         yield name if len(own) > 1 else own[0], tuple(own)
 
@@ -133,7 +133,7 @@ def _loads(
         share = nan if error is None else error.of_load(number_of)
         return Number(value, error=share * value)
 
-    parts = [_only(each.loads, names) for each in chosen.records[chosen.judged]]
+    parts = [_only(own.loads, names) for own in chosen.records[chosen.judged]]
     reduction: AnyCell = _NONE
     if chosen.judged != chosen.unprotected:
         load, unprotected = (
@@ -144,12 +144,12 @@ def _loads(
         reduction = Number.share(reductions(load, unprotected).item(), off)
     return (
         number(impulse_of),
-        Number.kpa(float(np.max([each.protected_peak_pa for each in parts]))),
+        Number.kpa(float(np.max([part.protected_peak_pa for part in parts]))),
         number(load_of),
         reduction,
         f"{cost:,.10g}",
         blasts.engine.words,
-        worst_standing(load.stood for each in parts for load in each.protected).words,
+        worst_standing(load.stood for part in parts for load in part.protected).words,
     )
 
 
@@ -181,7 +181,7 @@ def building_verdicts(found: Consequences) -> tuple[BuildingVerdict, ...]:
         likely = probability_text(draws.of(level), _DRAWS) if level else _NONE
         words, *panes = response_cells(alone, name)
         flags = [why for building, why in found.unchecked if building == name]
-        flags += [each.words for each in found.unjudged if each.building == name]
+        flags += [walls.words for walls in found.unjudged if walls.building == name]
         clipped = alone.level_on_cells(name) > alone.level(name)
         cells = (words, likely, *panes, alone.standing(name).words)
         verdicts.append(BuildingVerdict(name, response.severity, clipped, cells, tuple(flags)))
@@ -199,16 +199,16 @@ def verdict_table(
     """
     found: dict[tuple[str, str], list[tuple[str, BuildingVerdict]]] = {}
     for name, threat, responses in judged:
-        for each in responses:
-            found.setdefault((name, each.building), []).append((threat, each))
+        for response in responses:
+            found.setdefault((name, response.building), []).append((threat, response))
     rows = []
     for (name, building), own in found.items():
         title = scenario.title_of(building)
         if len(own) > 1:
-            worst = max((each for _, each in own), key=lambda each: each.severity)
+            worst = max((other for _, other in own), key=lambda each: each.severity)
             every = dict.fromkeys(flag for _, each in own for flag in each.flags)
             rows.append(_verdict_row(worst, name, f"worst of {len(own)}", title, every))
-        rows += [_verdict_row(each, name, threat, title, each.flags) for threat, each in own]
+        rows += [_verdict_row(part, name, threat, title, part.flags) for threat, part in own]
     return Table.of("", _BUILDINGS, rows, len(_BUILDINGS))
 
 

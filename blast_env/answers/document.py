@@ -325,9 +325,9 @@ def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -
         buildings: A table with `STANDING_COLUMNS`.
         column: The column with the name of the building.
     """
-    for each in buildings.to_dict("records"):
-        name = building_words(scenario, str(each[column]))
-        yield f"standing of the load, {name}: {each['standing']} ({each['reason']})"
+    for row in buildings.to_dict("records"):
+        name = building_words(scenario, str(row[column]))
+        yield f"standing of the load, {name}: {row['standing']} ({row['reason']})"
 
 
 def worse(reduction: float) -> str:

@@ -54,7 +54,7 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     law = f"calibration {found.calibration}, " if is_scaled else ""
     yield Line.of(f"{law}scenario hash {scenario.content_hash[:12]}", kind="quiet")
     fixed = len(fixed_charges(scenario))
-    if fixed > 1 and are_all(scenario, [each.charge for each in found.threats]):
+    if fixed > 1 and are_all(scenario, [threat.charge for threat in found.threats]):
         yield Line.of(
             f"note: the site has {fixed} fixed charges, which all count here; the interval is "
             "their spread, not an uncertainty about others"

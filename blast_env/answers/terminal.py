@@ -95,7 +95,7 @@ class TableView:
         groups = [[*names]]
         for index in range(len(names), len(widths)):
             taken = [*groups[-1], index]
-            needed = sum(widths[each].minimum + _BETWEEN for each in taken) - _BETWEEN
+            needed = sum(widths[own].minimum + _BETWEEN for own in taken) - _BETWEEN
             if needed > width and len(groups[-1]) > len(names):
                 groups.append([*names])
             groups[-1].append(index)
@@ -104,10 +104,10 @@ class TableView:
 
 def _shared(widths: Sequence[Measurement], room: int) -> list[int]:
     """Return the widths of columns: their longest words, and a share of the space left."""
-    shared = [each.minimum for each in widths]
+    shared = [width.minimum for width in widths]
     left = room - sum(shared)
     # The smallest demand first: it takes the least space to avoid a second line.
-    for index in sorted(range(len(widths)), key=lambda each: widths[each].span):
+    for index in sorted(range(len(widths)), key=lambda own: widths[own].span):
         given = min(widths[index].span, max(left, 0))
         shared[index] += given
         left -= given

@@ -138,8 +138,8 @@ class BlastTask:
         pairs = [(threat, name) for threat in self.threats for name in layouts]
         whole = campaign(layouts, self.threats)
         for number, (threat, name) in enumerate(pairs):
-            keys = [whole.evaluator.key(layouts[each], threat).digest for each in ("", name)]
-            bare, folder = (self.blasts / each for each in keys)
+            keys = [whole.evaluator.key(layouts[side], threat).digest for side in ("", name)]
+            bare, folder = (self.blasts / key for key in keys)
             is_known = whole.evaluator.known(layouts[name], threat) is not None
             if not (is_known and read_kept(BlastPictures, folder / PICTURES)):
                 one = replace(campaign([name], [threat]), coarser=None)
@@ -196,9 +196,9 @@ def _scale(shot: PressureShot, kept: Path) -> Scale:
     return Scale(
         film_kpa=film_kpa,
         until_s=_last_seen_s(shot, film_kpa),
-        levels={each: map_levels(result, each) for each in _QUANTITIES},
+        levels={quantity: map_levels(result, quantity) for quantity in _QUANTITIES},
         walls={
-            name: {each: full_load(result, name, each) for each in _QUANTITIES}
+            name: {quantity: full_load(result, name, quantity) for quantity in _QUANTITIES}
             for name in _facades_of(result)
         },
     )
@@ -208,7 +208,7 @@ def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
     """Return the time of the last overpressure that the colours of a film show, s."""
     least_pa = _LEAST_SHOWN * film_kpa * PA_PER_KPA
     frames = shot.planes[0].frames
-    seen = [each.time_s for each in frames if np.nanmax(each.overpressure_pa) >= least_pa]
+    seen = [frame.time_s for frame in frames if np.nanmax(frame.overpressure_pa) >= least_pa]
     return seen[-1] if seen else shot.result.time_s
 
 

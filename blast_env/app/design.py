@@ -75,7 +75,7 @@ class Design:
         """Return the design as plain data."""
         return {
             "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
-            "layouts": [[list(each) for each in layout] for layout in self.layouts],
+            "layouts": [[list(element) for element in layout] for layout in self.layouts],
             "active": self.active,
         }
 
@@ -92,7 +92,7 @@ class Design:
         """
         try:
             scenario = Scenario.from_document(record["scenario"], source)
-            layouts = tuple(placing.layout_from(scenario, each) for each in record["layouts"])
+            layouts = tuple(placing.layout_from(scenario, layout) for layout in record["layouts"])
             return cls(scenario, layouts, int(record["active"]))
         except BlastEnvError:
             raise
@@ -164,8 +164,8 @@ class History:
 
         return {
             "present": of_step(self.present),
-            "past": [of_step(each) for each in self.past],
-            "future": [of_step(each) for each in self.future],
+            "past": [of_step(step) for step in self.past],
+            "future": [of_step(step) for step in self.future],
             "sites": sites,
         }
 
@@ -184,8 +184,8 @@ class History:
         try:
             return cls(
                 step_of(record["present"]),
-                tuple(step_of(each) for each in record["past"]),
-                tuple(step_of(each) for each in record["future"]),
+                tuple(step_of(step) for step in record["past"]),
+                tuple(step_of(step) for step in record["future"]),
             )
         except (KeyError, TypeError, IndexError) as error:
             raise BlastEnvError(f"{source}: is not a design: {error!r}") from error

@@ -129,7 +129,7 @@ class Editor:
     def named_at(self, x_m: float, y_m: float) -> str:
         """Return the label of the thing at a place; empty without one."""
         thing = edits.thing_at(self.scenario, x_m, y_m, _HANDLE_M)
-        return next((words for each, words in edits.things(self.scenario) if each == thing), "")
+        return next((words for own, words in edits.things(self.scenario) if own == thing), "")
 
     # The mouse.
 
@@ -214,7 +214,9 @@ class Editor:
         design = self.session.design
         there = placing.element_at(design.scenario, design.layout, self.cursor)
         if there is not None:
-            self._keep_layout("erase 1", tuple(each for each in design.layout if each != there))
+            self._keep_layout(
+                "erase 1", tuple(element for element in design.layout if element != there)
+            )
         else:
             self._show_at(self.cursor)
             if self.ghost is not None and self.ghost.reason:
@@ -309,7 +311,7 @@ class Editor:
         cell = placing.cell_at(scenario, x_m, y_m)
         if cell is None:
             return
-        others = tuple(each for each in stroke.layout if each != lifted)
+        others = tuple(element for element in stroke.layout if element != lifted)
         moved = placing.moved_to(lifted, cell)
         reason = placing.reason_against(scenario, others, moved)
         self.ghost = Ghost(placing.rectangle_of(scenario, moved), reason or "")
@@ -324,7 +326,7 @@ class Editor:
         there = placing.element_at(scenario, layout, cell)
         if erase:
             if there is not None:
-                self.pending = tuple(each for each in layout if each != there)
+                self.pending = tuple(element for element in layout if element != there)
             return
         self._show_at(cell)
         if self.ghost is None or not self.ghost.reason:

@@ -137,7 +137,7 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
 
 def has(scenario: Scenario, thing: SiteThing) -> bool:
     """Return whether a thing is (still) on the site."""
-    return any(each == thing for each, _ in things(scenario))
+    return any(own == thing for own, _ in things(scenario))
 
 
 def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
@@ -196,7 +196,7 @@ def _from_the_top(scenario: Scenario) -> list[SiteThing]:
         carries = is_structure and scenario.structures[thing.number].carries
         return carries, _DRAWN.index(thing.kind), -thing.number
 
-    return sorted((each for each, _ in things(scenario) if each.kind in _DRAWN), key=depth)
+    return sorted((own for own, _ in things(scenario) if own.kind in _DRAWN), key=depth)
 
 
 def _beside(source: AnySource, x_m: float, y_m: float) -> float:
@@ -304,7 +304,7 @@ def _parts_of(document: Document, thing: SiteThing | None, own: Document) -> lis
     """Return the structures of a structure's building."""
     if thing is None or thing.kind is not ThingKind.STRUCTURE or "building" not in own:
         return [own]
-    return [each for each in document["structures"] if each.get("building") == own["building"]]
+    return [part for part in document["structures"] if part.get("building") == own["building"]]
 
 
 def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
@@ -386,14 +386,14 @@ def added(
     if kind in (ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ITEM, ThingKind.MEASURE):
         _ = scenario.zone  # refuses a site without one
     after = changed(scenario, edit)
-    last = max(each.number for each, _ in things(after) if each.kind is kind)
+    last = max(own.number for own, _ in things(after) if own.kind is kind)
     return after, SiteThing(kind, last)
 
 
 def has_road_in_zone(scenario: Scenario) -> bool:
     """Return whether a line on which a charge may be crosses the build zone."""
     zone = scenario.build_zone
-    roads = (each for each in scenario.charge if isinstance(each, SegmentSource))
+    roads = (source for source in scenario.charge if isinstance(source, SegmentSource))
     return zone is not None and any(
         zone.rectangle_m.intersects_segment(*x.segment_m) for x in roads
     )
@@ -440,7 +440,7 @@ def _own(document: Document, thing: SiteThing) -> Document:
 
 def _free_name(word: str, things: Iterable[Any]) -> str:
     """Return an unused name: the word and a number."""
-    names = {each.name for each in things}
+    names = {thing.name for thing in things}
     return next(name for name in (f"{word}{n}" for n in range(1, 200)) if name not in names)
 
 
@@ -452,7 +452,7 @@ def _structure(scenario: Scenario, area: Rectangle, height_m: float | None) -> D
         "corner_m": [area.left, area.bottom],
         "rows": max(round((area.top - area.bottom) / MODULE_SIDE_M), 1),
         "columns": max(round((area.right - area.left) / MODULE_SIDE_M), 1),
-        "protected": not any(each.protected for each in scenario.structures),
+        "protected": not any(structure.protected for structure in scenario.structures),
         **({"base_m": base_m} if base_m else {}),
         **({} if height_m is None else {"height_m": base_m + height_m}),
     }

@@ -163,9 +163,9 @@ class WorkFolder:
     def designs(self) -> list[DesignEntry]:
         """Return the designs, the latest changed first."""
         # A process killed while it creates a design leaves a folder without one.
-        folders = [each for each in self._designs.iterdir() if (each / _DESIGN).exists()]
-        entries = [DesignFolder(each).entry() for each in folders]
-        return sorted(entries, key=lambda each: -each.changed_s)
+        folders = [folder for folder in self._designs.iterdir() if (folder / _DESIGN).exists()]
+        entries = [DesignFolder(folder).entry() for folder in folders]
+        return sorted(entries, key=lambda part: -part.changed_s)
 
     def create(self, scenario: Scenario, label: str) -> DesignFolder:
         """Return the folder of a new design.

@@ -121,7 +121,7 @@ class Entrance:
         """The values allowed in the header `Host`, and after the scheme in `Origin`."""
         own = _OWN_NAMES if self.host in _EVERYWHERE else (*_OWN_NAMES, _bracketed(self.host))
         # As they are, too: behind a reverse proxy on its scheme's default port.
-        named = [each.lower() for each in self.more_names]
+        named = [more_name.lower() for more_name in self.more_names]
         bare = (*own, *named) if self.port == 80 else named
         return frozenset((*bare, *(f"{name}:{self.port}" for name in (*own, *named))))
 
@@ -207,7 +207,7 @@ class Guard:
             scheme, _, authority = origin.lower().partition("://")
             if scheme not in ("http", "https") or authority not in self._authorities:
                 return f"origin {origin!r} is not this page: other pages may not use it"
-        site, place = (asked.headers.get(f"sec-fetch-{each}", "") for each in ("site", "dest"))
+        site, place = (asked.headers.get(f"sec-fetch-{name}", "") for name in ("site", "dest"))
         # Other pages may only link here; a frame has another destination than "document".
         if site not in ("", "none", "same-origin") and place != "document":
             return "other pages may not use this page, nor show it in a frame"
@@ -225,7 +225,13 @@ class Guard:
         Not an HTTP redirect: a browser that came from another page would send no cookie with it.
         """
         path = quote("/" + asked.scope["path"].lstrip("/\\"))
-        rest = urlencode([each for each in asked.query_params.multi_items() if each[0] != TOKEN])
+        rest = urlencode(
+            [
+                multi_item
+                for multi_item in asked.query_params.multi_items()
+                if multi_item[0] != TOKEN
+            ]
+        )
         where = html.escape(f"{path}?{rest}" if rest else path)
         answer = HTMLResponse(
             f'<!doctype html><meta http-equiv="refresh" content="0; url={where}">'

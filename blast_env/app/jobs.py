@@ -164,9 +164,9 @@ class Workers:
 
     def stop(self, folder: Path) -> None:
         """Stop work; a search keeps the best layout so far."""
-        waiting = [each for each in self._waiting if each[0] == folder]
-        for each in waiting:
-            self._waiting.remove(each)
+        waiting = [waiting for waiting in self._waiting if waiting[0] == folder]
+        for own in waiting:
+            self._waiting.remove(own)
             end(folder, "stopped", "stopped before it began")
         for running in self._running:
             if running.folder == folder:
@@ -174,15 +174,15 @@ class Workers:
 
     def is_known(self, folder: Path) -> bool:
         """Return whether work is queued or running here."""
-        return folder in (*(each for each, _ in self._waiting), *(x.folder for x in self._running))
+        return folder in (*(own for own, _ in self._waiting), *(x.folder for x in self._running))
 
     def tick(self) -> None:
         """Check the processes for their end, and start queued work."""
-        for each in [*self._running]:
-            is_late = each.stop_by_s is not None and monotonic() > each.stop_by_s
-            if is_late or not each.process.is_alive():
-                each.end()
-                self._running.remove(each)
+        for own in [*self._running]:
+            is_late = own.stop_by_s is not None and monotonic() > own.stop_by_s
+            if is_late or not own.process.is_alive():
+                own.end()
+                self._running.remove(own)
         if self._loading is not None and self._loading.is_alive():
             return
         while self._waiting and len(self._running) < self.most:
@@ -196,19 +196,19 @@ class Workers:
         """Stop all work, let searches keep their best layouts, and end the processes."""
         for folder, _ in [*self._waiting]:
             self.stop(folder)
-        for each in self._running:
-            each.stop()
+        for own in self._running:
+            own.stop()
         until_s = monotonic() + _GRACE_S
-        for each in self._running:
-            each.process.join(max(until_s - monotonic(), 0.0))
-            each.end()
+        for part in self._running:
+            part.process.join(max(until_s - monotonic(), 0.0))
+            part.end()
         self._running.clear()
 
 
 def jobs_of(folder: Path, most: int | None = None) -> list[tuple[Path, Status]]:
     """Return the requested work, the latest first, at most `most` of it."""
-    folders = sorted((each for each in folder.iterdir() if each.is_dir()), reverse=True)
-    return [(each, read_status(each)) for each in folders[:most]]
+    folders = sorted((path for path in folder.iterdir() if path.is_dir()), reverse=True)
+    return [(path, read_status(path)) for path in folders[:most]]
 
 
 def settle(jobs: Path, workers: Workers) -> None:

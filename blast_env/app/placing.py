@@ -55,7 +55,7 @@ class Measurable(NamedTuple):
 
 def plain(layout: Iterable[Element]) -> PlainLayout:
     """Return a layout as data."""
-    return tuple(tuple(each) for each in layout)
+    return tuple(tuple(own) for own in layout)
 
 
 def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
@@ -68,7 +68,7 @@ def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
         if data:
             raise LayoutError(f"{scenario.name} has no build zone: no barrier can be placed")
         return ()
-    return scenario.build_zone.catalogue.layout_from([tuple(each) for each in data])
+    return scenario.build_zone.catalogue.layout_from([tuple(own) for own in data])
 
 
 def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
@@ -101,12 +101,12 @@ def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
     known = {**catalogue(), **scenario.components}
     return tuple(
         Measurable(
-            each.name,
-            f"{each.name}, {zone.priced(each.cost)}",
-            _words_of(each, known),
-            Measure.named(each.name) in layout,
+            measure.name,
+            f"{measure.name}, {zone.priced(measure.cost)}",
+            _words_of(measure, known),
+            Measure.named(measure.name) in layout,
         )
-        for each in zone.measures
+        for measure in zone.measures
     )
 
 
@@ -114,7 +114,7 @@ def _words_of(measure: AnyMeasure, known: Components) -> str:
     """Return a measure in words: `window, 12 mm laminated on office, west, storeys 1`."""
     if isinstance(measure, Demolition):
         return f"removes {', '.join(measure.structures)}: needs a new blast"
-    names = [each for each in (measure.glazing, measure.wall) if each]
+    names = [own for own in (measure.glazing, measure.wall) if own]
     what = " and ".join(known[name].title or name for name in names)
     where = [*(measure.structures or ("all structures",))]
     where += [] if len(measure.walls) == len(WALLS) else measure.walls
@@ -129,7 +129,7 @@ def element(scenario: Scenario, item: str, cell: Cell, turned: bool = False) -> 
 
     An unknown item stands for the first of the catalogue; one that cannot be turned is not turned.
     """
-    items = {each.name: each for each in scenario.zone.items}
+    items = {own.name: own for own in scenario.zone.items}
     if not items:
         return cell
     chosen = items.get(item, scenario.zone.items[0])
@@ -141,7 +141,7 @@ def element_at(scenario: Scenario, layout: Layout, cell: Cell) -> Element | None
     if scenario.build_zone is None:
         return None
     catalogue = scenario.build_zone.catalogue
-    return next((each for each in layout if cell in catalogue.cells(each)), None)
+    return next((own for own in layout if cell in catalogue.cells(own)), None)
 
 
 def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
@@ -178,9 +178,9 @@ def legal_elements(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[st
         return LayoutState.of(scenario.without_budget, layout).layout, ()
     except LayoutError:
         placement, reasons = LayoutState.empty(scenario.without_budget), []
-    for each in layout:
+    for own in layout:
         try:
-            placement = placement.place(each)
+            placement = placement.place(own)
         except LayoutError as error:
             reasons.append(str(error))
     return placement.layout, tuple(reasons)

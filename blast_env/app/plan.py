@@ -126,15 +126,15 @@ def plan_svg(
 ) -> str:
     """Return the plan of a site with a layout; `overlay_svg` goes on top of it."""
     features = _features(scenario, layout)
-    cells = [each for each in features if each.kind in (NO_CELL, FREE_CELL)]
+    cells = [feature for feature in features if feature.kind in (NO_CELL, FREE_CELL)]
     return "".join(
         (
-            *draw_features(view, [each for each in features if each.kind is Kinds.SITE]),
+            *draw_features(view, [feature for feature in features if feature.kind is Kinds.SITE]),
             *_lines(view, scenario),
             *draw_features(view, cells),
             *_cell_lines(view, scenario),
             *draw_features(view, without(features, Kinds.SITE, NO_CELL, FREE_CELL)),
-            *_names(view, [_named(each) for each in features]),
+            *_names(view, [_named(feature) for feature in features]),
             *_selection(view, scenario, selected),
             *_scale_bar(view),
         )
@@ -143,11 +143,11 @@ def plan_svg(
 
 def plan_legend(scenario: Scenario, layout: Layout) -> str:
     """Return the legend of the plan as HTML, the topmost features first."""
-    shown = {each.title: each for each in without(_features(scenario, layout), Kinds.SITE)}
+    shown = {own.title: own for own in without(_features(scenario, layout), Kinds.SITE)}
     return "".join(
-        f'<span><svg width="24" height="14" aria-hidden="true">{"".join(_swatch(each))}</svg>'
+        f'<span><svg width="24" height="14" aria-hidden="true">{"".join(_swatch(part))}</svg>'
         f"{escape(title)}</span>"
-        for title, each in sorted(shown.items(), key=lambda pair: -pair[1].kind.level)
+        for title, part in sorted(shown.items(), key=lambda pair: -pair[1].kind.level)
     )
 
 
@@ -196,10 +196,10 @@ def overlay_svg(
 def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]:
     """Yield the SVG of features by geometry and look; areas of a kind are one figure."""
     for (kind, look, colour, corners), group in groupby(
-        features, key=lambda each: (each.kind, each.look, each.colour, min(len(each.places_m), 3))
+        features, key=lambda part: (part.kind, part.look, part.colour, min(len(part.places_m), 3))
     ):
         alike = list(group)
-        shapes = (ring for each in alike for ring in each.rings_m)
+        shapes = (ring for own in alike for ring in own.rings_m)
         places = [[view.pixel(*place) for place in shape] for shape in shapes]
         if corners == 3:
             yield from _areas(kind, look, colour, places)
@@ -272,25 +272,25 @@ def _names(view: PixelView, features: Sequence[Feature]) -> Iterator[str]:
     settled = settled_labels(
         features,
         labels,
-        [(_LETTER_PX * max(map(len, each)) + 4.0, _LINE_PX * len(each)) for each in lines],
+        [(_LETTER_PX * max(map(len, line)) + 4.0, _LINE_PX * len(line)) for line in lines],
         box,
-        lambda each: box(each) if each.kind in STANDING else None,
+        lambda part: box(part) if part.kind in STANDING else None,
         Rectangle(0.0, -float(view.height_px), float(view.width_px), 0.0),
         gap=4.0,
         far=10.0,
     )
-    for each, texts in zip(settled, lines, strict=True):
-        kind = each.label.feature.kind
+    for own, texts in zip(settled, lines, strict=True):
+        kind = own.label.feature.kind
         colour = _hex(INK if kind is Kinds.STRUCTURE else kind.look.line or INK)
-        if each.leader is not None:
-            (x0, y0), (x1, y1) = each.leader
+        if own.leader is not None:
+            (x0, y0), (x1, y1) = own.leader
             yield (
                 f'<line x1="{x0:g}" y1="{-y0:g}" x2="{x1:g}" y2="{-y1:g}" stroke="{colour}"'
                 ' stroke-width="0.8"></line>'
             )
-        x, _ = each.place.centre
+        x, _ = own.place.centre
         for number, text in enumerate(texts):
-            y = -each.place.top + _LINE_PX * (number + 0.8)
+            y = -own.place.top + _LINE_PX * (number + 0.8)
             yield _text(x, y, text, colour, 13 if number == 0 else 12)
 
 
@@ -326,7 +326,7 @@ def _text(x_px: float, y_px: float, text: str, colour: str, size_px: int = 13) -
 def _lines(view: PixelView, scenario: Scenario) -> Iterator[str]:
     site = scenario.site.rectangle_m
     steps = (1.0, 5.0, 10.0, 50.0, 100.0)
-    step = next((each for each in steps if each * view.pixels_per_m >= _LEAST_LINES_PX), 500.0)
+    step = next((own for own in steps if own * view.pixels_per_m >= _LEAST_LINES_PX), 500.0)
     lines = []
     for number in range(1, ceil(site.right / step)):
         (x, y0), (_, y1) = view.pixel(number * step, 0.0), view.pixel(0.0, site.top)
@@ -373,7 +373,7 @@ def _selection(view: PixelView, scenario: Scenario, selected: SiteThing | None) 
 
 def _scale_bar(view: PixelView) -> Iterator[str]:
     lengths = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
-    fitting = [each for each in lengths if each * view.pixels_per_m <= 0.2 * view.width_px]
+    fitting = [length for length in lengths if length * view.pixels_per_m <= 0.2 * view.width_px]
     length_m = fitting[-1] if fitting else lengths[0]
     x, y, width = 12.0, view.height_px - 10.0, length_m * view.pixels_per_m
     ink = _hex(INK)
@@ -440,7 +440,7 @@ class SketchView:
     def svg(self, chosen: PointM | None) -> str:
         """Return the outlines, and a star at the chosen place."""
         rings = "".join(
-            f"M{'L'.join('{:.1f} {:.1f}'.format(*self._pixel(each)) for each in outline)}Z"
+            f"M{'L'.join('{:.1f} {:.1f}'.format(*self._pixel(point)) for point in outline)}Z"
             for outline in self._sketch.outlines
         )
         ink = _hex(INK)

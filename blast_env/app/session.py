@@ -117,8 +117,8 @@ class Session:
 
     def _choose(self, threats: Iterable[str]) -> None:
         """Take the threats that the site has; the usual ones if it has none of them."""
-        known = {each.name for each in threats_of(self.scenario)}
-        self.threats = tuple(each for each in threats if each in known)
+        known = {own.name for own in threats_of(self.scenario)}
+        self.threats = tuple(threat for threat in threats if threat in known)
         self.threats = self.threats or usual_threats(self.scenario)
 
     @property
@@ -169,7 +169,7 @@ class Session:
             BlastEnvError: As for `put`.
         """
         own = Measure.named(measure)
-        layout = tuple(each for each in self.design.layout if each != own)
+        layout = tuple(element for element in self.design.layout if element != own)
         label = f"{'take' if taken else 'leave'} {measure}"
         self.put(label, self.design.with_layout((*layout, own) if taken else layout))
 
@@ -198,7 +198,7 @@ class Session:
 
     def chosen_threats(self) -> tuple[LoadCase, ...]:
         """Return the threats of blasts."""
-        return tuple(each for each in threats_of(self.scenario) if each.name in self.threats)
+        return tuple(own for own in threats_of(self.scenario) if own.name in self.threats)
 
     def blast(self, slots: Iterable[int]) -> Path:
         """Run the blasts of layouts under the chosen threats; return the folder of the work.
@@ -207,7 +207,7 @@ class Session:
             BlastEnvError: If there are no layouts, or the work cannot be started.
         """
         chosen = [*slots]
-        names = ", ".join(SLOTS[each] for each in chosen)
+        names = ", ".join(SLOTS[own] for own in chosen)
         folder = None
         for slot in chosen:
             task = BlastTask(
@@ -263,7 +263,7 @@ class Session:
                 f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
             )
         check_layout(self.scenario, self.design.layout)  # refuses one that costs too much
-        charges = tuple(each.charge for each in self.chosen_threats())
+        charges = tuple(chosen_threat.charge for chosen_threat in self.chosen_threats())
         return StudyOptions(charges=charges, cache=self.work.cache, **contents)
 
     def ask(
@@ -290,9 +290,9 @@ class Session:
         """Return the largest costs of the blasts of a question; see `ask`."""
         task = self._question(question, target, mass_error, budget)
         layouts = 2 if task.layout else 1
-        fine = tuple(self._cost(each.charge) for each in task.threats)
+        fine = tuple(self._cost(threat.charge) for threat in task.threats)
         coarse = tuple(
-            self._search_engine.cost(self.scenario, each.charge) for each in task.threats
+            self._search_engine.cost(self.scenario, threat.charge) for threat in task.threats
         )
         if question is Question.CAPACITY:
             return fine * (layouts * MOST_BLASTS)
@@ -335,10 +335,14 @@ class Session:
         """
         subject, found = self.subject, dict[Question, Answer]()
         read = [read_kept(Answer, path) for path in self.folder.answers_there()]
-        every = [each for each in read if each is not None]
-        for answer in sorted(every, key=lambda each: each.subject != subject):
+        every = [own for own in read if own is not None]
+        for answer in sorted(every, key=lambda part: part.subject != subject):
             found.setdefault(answer.question, answer)
-        return [(found[each], found[each].subject == subject) for each in Question if each in found]
+        return [
+            (found[question], found[question].subject == subject)
+            for question in Question
+            if question in found
+        ]
 
     @property
     def subject(self) -> str:
@@ -384,7 +388,7 @@ class Session:
         keys: dict[str, AnyCharge] = {}
         evaluator = self._campaign({}).evaluator
         for threat in self.chosen_threats():
-            for layout in ((), *(self.design.layouts[each] for each in slots)):
+            for layout in ((), *(self.design.layouts[slot] for slot in slots)):
                 key = evaluator.key(layout, threat).digest
                 if evaluator.known(layout, threat) is None or not self.folder.pictures_of(key):
                     keys[key] = threat.charge
@@ -395,7 +399,7 @@ class Session:
         coarser, threats = self._campaign({}).coarser, self.chosen_threats()
         if coarser is None:
             return ()
-        layouts = dict.fromkeys([(), *(self.design.layouts[each] for each in slots)])
+        layouts = dict.fromkeys([(), *(self.design.layouts[slot] for slot in slots)])
         missing = [
             layout
             for layout in layouts
@@ -424,8 +428,11 @@ class Session:
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return the costs of the blasts of a search."""
-        engine, charges = self._search_engine, [each.charge for each in self.chosen_threats()]
-        costs = [engine.cost(self.scenario, each) for each in charges]
+        engine, charges = (
+            self._search_engine,
+            [chosen_threat.charge for chosen_threat in self.chosen_threats()],
+        )
+        costs = [engine.cost(self.scenario, charge) for charge in charges]
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
     def _cost(self, charge: AnyCharge) -> CostGuess:
@@ -486,7 +493,9 @@ class Session:
             name: (blasts, placing.cost_of(self.scenario, self._layouts[name]))
             for name, blasts in self.results().items()
         }
-        return comparison(layouts, [each.name for each in self.chosen_threats()], self.scenario)
+        return comparison(
+            layouts, [chosen_threat.name for chosen_threat in self.chosen_threats()], self.scenario
+        )
 
     def verdicts(self) -> list[tuple[str, str, tuple[BuildingVerdict, ...]]]:
         """Return the verdicts on the buildings in all blasts of the current design.
@@ -494,15 +503,15 @@ class Session:
         Each has the name of the layout, that of the threat, and the verdicts.
         """
         return [
-            (each.name, threat.name, own)
+            (part.name, threat.name, own)
             for threat in self.chosen_threats()
-            for each in self.shown(threat)
-            if (own := self.judged(each, threat))
+            for part in self.shown(threat)
+            if (own := self.judged(part, threat))
         ]
 
     def judged(self, shown: ShownLayout, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
         """Return the response of the buildings with their current facades to a blast."""
-        if not any(each.facade for each in self.scenario.structures):
+        if not any(structure.facade for structure in self.scenario.structures):
             return ()
         known = shown.key, repr(self.scenario.bays_with(shown.layout))
         if known not in self._judged:

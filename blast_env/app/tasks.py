@@ -56,7 +56,7 @@ class SearchTask:
         row, site = proposer_row(self.method), self.site
         if row.kind is ProposerKind.RULE and Need.VEHICLE not in row.needs:
             # One against vehicles plans for all of the site.
-            sources = tuple(source_of(each.charge) for each in self.threats)
+            sources = tuple(source_of(threat.charge) for threat in self.threats)
             site = site.model_copy(update={"charge": sources})
         engine = GasEngine.with_cells(self.cells)
         evaluator = BlastEvaluator(site, engine.coarser or engine, cache=self.cache)
@@ -169,7 +169,7 @@ class AnswerTask:
             return assessment(blasts, found, self.target, self.mass_error)
         evaluator, charges = (
             BlastEvaluator(self.site, engine, cache=self.cache),
-            [each.charge for each in self.threats],
+            [threat.charge for threat in self.threats],
         )
         return capacity_answer(self.site, capacity(evaluator, layouts, charges, writer.share))
 

@@ -82,6 +82,6 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
         return -stand_off_m(scenario.loaded_walls, charge.position_m) / cbrt(charge.tnt_kg)
 
     chosen = [max(own, key=severity) for own in sources.values()]
-    fixed = [each for each in chosen if not isinstance(each.charge, VehicleCharge)]
+    fixed = [part for part in chosen if not isinstance(part.charge, VehicleCharge)]
     worst = sorted(fixed, key=severity, reverse=True)[:MOST_USUAL]
-    return tuple(each.name for each in chosen if each in worst or each not in fixed)
+    return tuple(other.name for other in chosen if other in worst or other not in fixed)

@@ -105,10 +105,10 @@ def advise(
         f"each result is judged with {len(threats)}, {judge.words}"
     )
     coarse, fine = (
-        [each.cost(site, threat.charge) for threat in threats] for each in (engine, judge)
+        [own.cost(site, threat.charge) for threat in threats] for own in (engine, judge)
     )
     costs = [*islice(cycle(coarse), len(kinds) * rounds * budget), *fine * (len(kinds) * rounds)]
-    print_cost(each for each in costs if each is not None)
+    print_cost(cost for cost in costs if cost is not None)
     judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
     with resumable(resume_words(cache)), progress_bar(f"{len(kinds)} kinds") as progress:
         found = advised(judging, budget, rounds, seed, progress)
@@ -125,11 +125,10 @@ def _draw(advice: AdviceResult) -> "Figure":
 
     judge, scenario = advice.judge, advice.judge.scenario
     tried = {
-        str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried]
-        for each in advice.found
+        str(own.kind): [PricedDamage(x.cost, x.damage) for x in own.tried] for own in advice.found
     }
     searched = {
-        x.layout: PricedDamage(x.cost, x.damage) for each in advice.found for x in each.tried
+        x.layout: PricedDamage(x.cost, x.damage) for part in advice.found for x in part.tried
     }
     pairs = [
         (searched[layout], searched[layout]._replace(damage=seen.worst_damage(scenario)))

@@ -139,7 +139,7 @@ def assess(
     if screen and capacity:
         raise BlastEnvError("--screen and --capacity exclude each other")
     site = load_scenario(scenario).with_facades(glazing, wall)
-    required = [Requirement.parsed(each) for each in require or ()]
+    required = [Requirement.parsed(own) for own in require or ()]
     layouts: dict[str, Layout] = {"no barrier": ()}
     if layout is not None:
         elements = tuple(load_layout(layout, site))
@@ -152,7 +152,7 @@ def assess(
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
     threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
-    drawn = [each.charge for each in threats]
+    drawn = [threat.charge for threat in threats]
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
         refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
@@ -227,13 +227,13 @@ def _screen(
     """Print the level of protection of each facade, and the stand-off that each level needs."""
     level = scenario.objective.level or LevelOfProtection.LOW
     required = required or [Requirement.of_level(level)]
-    named = [NamedMass.parsed(each) for each in masses]
+    named = [NamedMass.parsed(mass) for mass in masses]
     found = screen_site(scenario, layout, named)
     beside = {} if engine is None else _by_gas(scenario, layout, found, engine)
     print_parts(screening_answer(scenario, layout, found, required, beside))
     if named:
         print_line(f"presets: {PRESETS_SOURCE}")
-    if any("," in each for each in masses):
+    if any("," in mass for mass in masses):
         print_line(f"TNT equivalents: {EQUIVALENTS_SOURCE}")
     if engine is None:
         print_line("--gas shows by how much that matters at each worst place")
@@ -250,10 +250,10 @@ def _by_gas(
     scenario: Scenario, layout: Layout, found: Screening, engine: Engine
 ) -> dict[str, Consequences]:
     """Return the consequences of each worst place by gas dynamics."""
-    threats = [LoadCase(each.charge, name=each.name) for each in found.threats]
+    threats = [LoadCase(threat.charge, name=threat.name) for threat in found.threats]
     campaign = Campaign.on(scenario, {"": layout}, threats, engine)
     print_line(engine.describe([scenario]))
     print_cost(campaign.cost())
     with progress_bar(f"{len(threats)} blasts") as progress:
         blasts = campaign.run(progress)
-    return {each.name: consequences_of(blasts.under([k])) for k, each in enumerate(threats)}
+    return {own.name: consequences_of(blasts.under([k])) for k, own in enumerate(threats)}

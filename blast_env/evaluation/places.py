@@ -27,7 +27,7 @@ _STEPS: Final = 400
 def place_text(threat: LoadCase, scenario: Scenario, layout: Layout) -> str:
     """Return the place of a charge in words, with a layout, and without if that differs."""
     unprotected, protected = (
-        _place_text(threat.charge_against(scenario, each)) for each in ((), layout)
+        _place_text(threat.charge_against(scenario, own)) for own in ((), layout)
     )
     return (
         protected
@@ -41,13 +41,13 @@ def chief_threats(
 ) -> tuple[LoadCase, ...]:
     """Return the most severe charges: of each source, the place that governs; at most `most`."""
     sources: dict[int, list[LoadCase]] = {}
-    for each in places:
-        sources.setdefault(each.source, []).append(each)
+    for place in places:
+        sources.setdefault(place.source, []).append(place)
     worst = [max(own, key=severity) for own in sources.values()]
     ranked = sorted(worst, key=severity, reverse=True)[:most]
     return tuple(
-        replace(each, name=f"T{number}", why=_why(each, len(sources[each.source])))
-        for number, each in enumerate(ranked, start=1)
+        replace(part, name=f"T{number}", why=_why(part, len(sources[part.source])))
+        for number, part in enumerate(ranked, start=1)
     )
 
 
@@ -76,7 +76,7 @@ def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
                 name = f"vehicle, place {rank + 1} by distance"
                 found.setdefault(vehicle, LoadCase(vehicle, 0, name, why, index))
             continue
-        nearest = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
+        nearest = min(_candidates(scenario, source), key=lambda own: _distance_m(scenario, own))
         for place in (*_spread(source, count), nearest):
             charge = Charge(place, source.tnt_kg, source.height_m)
             found.setdefault(charge, LoadCase(charge, 0, _place_text(charge), why, index))
@@ -105,8 +105,8 @@ def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, flo
         left, bottom, right, top = source.rectangle_m
         for target in _protected(scenario):
             # The points of the area nearest to the corners of the building.
-            xs_m = {min(max(each, left), right) for each in (target.left, target.right)}
-            ys_m = {min(max(each, bottom), top) for each in (target.bottom, target.top)}
+            xs_m = {min(max(own, left), right) for own in (target.left, target.right)}
+            ys_m = {min(max(part, bottom), top) for part in (target.bottom, target.top)}
             yield from ((x_m, y_m) for x_m in xs_m for y_m in ys_m)
         return
     yield from _spread(source, _STEPS + 1)
@@ -128,8 +128,8 @@ def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
 
 
 def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
-    return min(each.distance_to(place) for each in _protected(scenario))
+    return min(rectangle_m.distance_to(place) for rectangle_m in _protected(scenario))
 
 
 def _protected(scenario: Scenario) -> list[Rectangle]:
-    return [each.rectangle_m for each in scenario.structures if each.protected]
+    return [structure.rectangle_m for structure in scenario.structures if structure.protected]

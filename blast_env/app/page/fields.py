@@ -177,10 +177,10 @@ def fields_of(
     if thing.kind is ThingKind.STRUCTURE:
         name = FormField("name", "name", "text")
         last = [
-            each
-            if side is None or each.form not in _FILLINGS
-            else each._replace(side=side, label=f"{each.label}, {side} side")
-            for each in _LAST_OF_STRUCTURE
+            own
+            if side is None or own.form not in _FILLINGS
+            else own._replace(side=side, label=f"{own.label}, {side} side")
+            for own in _LAST_OF_STRUCTURE
         ]
         return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *last)
     return _FIELDS[thing.kind]
@@ -215,7 +215,7 @@ def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]
             before = FacadeSection.model_validate(section.get(field.inside) or {})
             after = before.with_side(field.side, **{field.key: value})
             table = after.model_dump(mode="json", exclude_none=True)
-        table = {key: each for key, each in table.items() if each is not None}
+        table = {key: own for key, own in table.items() if own is not None}
         is_empty = not (table.keys() & _FILLINGS or table.get("parts"))
         return {field.inside: None if field.key in _FILLINGS and is_empty else table}
     if value is None:

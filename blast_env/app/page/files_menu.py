@@ -155,8 +155,8 @@ class ReportDialog:
             with ui.row():
                 ui.button("begin", on_click=self._begin).props("no-caps")
                 ui.button("cancel", on_click=self._dialog.close).props("flat no-caps")
-        for each in (self._cells, self._items):
-            each.on_value_change(self._say_cost)
+        for own in (self._cells, self._items):
+            own.on_value_change(self._say_cost)
         self._say_cost()
 
     @property

@@ -286,9 +286,9 @@ class SolidView:
         if solids == self._drawn:
             return
         self._drawn = solids
-        self._see_through.set_visibility(any(each.opacity == SEE_THROUGH for each in solids))
+        self._see_through.set_visibility(any(own.opacity == SEE_THROUGH for own in solids))
         self._scene.clear()
         with self._scene:
-            for each in solids:
-                box = self._scene.box(*each.size_m).move(*each.centre_m)
-                box.material(each.colour, each.opacity).with_name(each.name)
+            for solid in solids:
+                box = self._scene.box(*solid.size_m).move(*solid.centre_m)
+                box.material(solid.colour, solid.opacity).with_name(solid.name)

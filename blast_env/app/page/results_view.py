@@ -101,7 +101,7 @@ class ResultsView:
     def refresh(self) -> None:
         """Show the current results, if they have changed."""
         session = self._session
-        threats = {each.name: each for each in session.chosen_threats()}
+        threats = {chosen_threat.name: chosen_threat for chosen_threat in session.chosen_threats()}
         if self._threat not in threats:
             self._threat = next(iter(threats))
         self._threats.set_options([*threats], value=self._threat)
@@ -117,14 +117,14 @@ class ResultsView:
         results, judged = session.results(), session.verdicts()
         found = [*self._found(shown, threat, results)]
         self._offer(found)
-        chosen = [each for each in found if self._with_bare or each.shown.name != NO_BARRIER]
+        chosen = [blast for blast in found if self._with_bare or blast.shown.name != NO_BARRIER]
         self._show_cards(chosen, threat)
-        self._sharp.visible = any(each.is_clipped for *_, own in judged for each in own)
+        self._sharp.visible = any(verdict.is_clipped for *_, own in judged for verdict in own)
         self._unglazed.visible = bool(found) and not judged
         fill(self._verdicts, verdict_table(session.scenario, judged))
         fill(self._table, session.comparison())
-        errors = (GridError.of(each) for each in results.values())
-        self._errors.visible = any(each is not None for each in errors)
+        errors = (GridError.of(result) for result in results.values())
+        self._errors.visible = any(error is not None for error in errors)
         self._empty.visible = not found
         self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes(found)
@@ -134,19 +134,19 @@ class ResultsView:
     ) -> Iterator[_Found]:
         """Yield every blast that is complete, with the addresses of its pictures."""
         session = self._session
-        for each in shown:
-            drawn = session.folder.pictures_of(each.key)
-            blasts = results.get(each.name)
+        for layout in shown:
+            drawn = session.folder.pictures_of(layout.key)
+            blasts = results.get(layout.name)
             if blasts is None or threat not in blasts.threats or not drawn:
                 continue
-            where = f"/blasts/{session.folder.design_id}/{each.key}"
+            where = f"/blasts/{session.folder.design_id}/{layout.key}"
             pictures = {own.label: (f"{where}/{own.file}", own) for own in drawn}
-            judged = (own.building for own in session.judged(each, threat))
+            judged = (own.building for own in session.judged(layout, threat))
             damage = {f"damage of {session.scenario.title_of(own)}": own for own in judged}
-            yield _Found(each, blasts, blasts.threats.index(threat), pictures, damage)
+            yield _Found(layout, blasts, blasts.threats.index(threat), pictures, damage)
 
     def _offer(self, found: Sequence[_Found]) -> None:
-        labels = (label for each in found for label in (*each.pictures, *each.damage))
+        labels = (label for blast in found for label in (*blast.pictures, *blast.damage))
         options = [*dict.fromkeys(labels)] or [_FILM]
         if self._what not in options:
             self._what = options[0]
@@ -154,13 +154,14 @@ class ResultsView:
 
     def _show_cards(self, found: Sequence[_Found], threat: LoadCase) -> None:
         self._cards.clear()
-        kinds = {each.pictures[self._what][1].kind for each in found if self._what in each.pictures}
-        wide = "walls" in kinds or any(self._what in each.damage for each in found)
+        shown = [blast.pictures[self._what] for blast in found if self._what in blast.pictures]
+        kinds = {picture.kind for _, picture in shown}
+        wide = "walls" in kinds or any(self._what in blast.damage for blast in found)
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
-            for each in found:
-                self._card(each, threat)
+            for blast in found:
+                self._card(blast, threat)
         if "film" in kinds and len(found) > 1:
             ui.run_javascript(_START_FILMS)
 
@@ -191,13 +192,13 @@ class ResultsView:
     def _summary(self, found: _Found) -> str:
         noun = self._session.scenario.objective.noun
         noun = "mean impulse on protected facades" if noun == "impulse" else noun
-        parts = sum(each.protected for each in self._session.scenario.structures)
+        parts = sum(structure.protected for structure in self._session.scenario.structures)
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
         return f"{noun}: {headline(found.blasts, found.number).text(TYPOGRAPHIC)}{added}"
 
     def _show_notes(self, found: Sequence[_Found]) -> None:
-        records = [each.blasts.records[each.shown.name][each.number] for each in found]
+        records = [blast.blasts.records[blast.shown.name][blast.number] for blast in found]
         self._notes.clear()
         with self._notes:
-            for note in dict.fromkeys(note for each in records for note in each.complete.notes):
+            for note in dict.fromkeys(note for record in records for note in record.complete.notes):
                 ui.label(f"note: {note}").classes("be-quiet")

@@ -67,14 +67,14 @@ class SitePanel:
         thing = editor.selected or _SITE
         self._filling = True
         self._name.value = scenario.name
-        options = {_id(each): words for each, words in edits.things(scenario)}
+        options = {_id(own): words for own, words in edits.things(scenario)}
         self._chooser.set_options(options, value=_id(thing))
         fields = fields_of(scenario, thing, self._side)
         if fields != self._fields:
             self._fields = fields
             self._form.clear()
             with self._form:
-                self._inputs = [self._input(each) for each in fields]
+                self._inputs = [self._input(part) for part in fields]
         section = edits.section_of(scenario, thing)
         for field, element in zip(self._fields, self._inputs, strict=True):
             value: Any = value_of(section, field) if field.form != "of" else self._side or ""
@@ -87,7 +87,7 @@ class SitePanel:
             (
                 f"Air {scenario.air_height_m:g} m high.",
                 "Walls without a height reach up to it."
-                if any(each.height_m is None for each in scenario.structures)
+                if any(structure.height_m is None for structure in scenario.structures)
                 else "",
             )
         )
@@ -128,7 +128,7 @@ class SitePanel:
 
     def _components(self, kind: str) -> dict[str, str]:
         known = {**catalogue(), **self._editor.session.scenario.components}
-        return {name: each.title or name for name, each in known.items() if each.kind == kind}
+        return {name: own.title or name for name, own in known.items() if own.kind == kind}
 
     def _put(self, field: FormField, typed: Any) -> None:
         if self._filling:

@@ -78,7 +78,7 @@ class StartPage:
 
     def _blank(self) -> None:
         try:
-            self._create(blank_site(*(each.filled for each in self._sides)), "a blank site")
+            self._create(blank_site(*(side.filled for side in self._sides)), "a blank site")
         except BlastEnvError as error:
             complain(error)
 

@@ -289,7 +289,7 @@ def _places(text: str) -> list[tuple[float, float]]:
         BlastEnvError: If a part is no place.
     """
     places = []
-    for part in filter(None, (each.strip() for each in text.split(";"))):
+    for part in filter(None, (own.strip() for own in text.split(";"))):
         try:
             x, y = (plain_number("a coordinate", value.strip()) for value in part.split(","))
         except ValueError:

@@ -19,7 +19,7 @@ _HEADINGS = {
     Question.CAPACITY: "Up to which charge?",
     Question.ADVISE: "Which measures comply at the least cost?",
 }
-_LEVELS = {int(each): each.label for each in [*LevelOfProtection][1:]}
+_LEVELS = {int(own): own.label for own in [*LevelOfProtection][1:]}
 
 
 class VerdictView:

@@ -282,17 +282,17 @@ class WorkPanel:
         self._slots.value = design.active
         self._counted.text = placing.counted(design.scenario, design.layout)
         offers = placing.palette(design.scenario, design.layout)
-        names = [each.name for each in offers]
+        names = [offer.name for offer in offers]
         if offers and self._editor.item not in names:
             self._editor.item = names[0]
-        options = {each.name: f"{each.label}, {each.left} left" for each in offers}
+        options = {offer.name: f"{offer.label}, {offer.left} left" for offer in offers}
         self._palette.set_options(options, value=self._editor.item if offers else None)
-        chosen = next((each for each in offers if each.name == self._editor.item), None)
+        chosen = next((offer for offer in offers if offer.name == self._editor.item), None)
         self._turned.value = self._editor.turned
         self._turned.visible = chosen is not None and chosen.can_turn
         self._offer_measures(design.scenario, design.layout)
         self._offer_proposals(design.scenario)
-        known = [each.name for each in threats_of(design.scenario)]
+        known = [own.name for own in threats_of(design.scenario)]
         self._threats.set_options(known, value=list(session.threats))
         self._cells.value = session.cells
         self._filling = False
@@ -329,11 +329,11 @@ class WorkPanel:
         with self._measures:
             if offers:
                 ui.label("measures: hardening needs no new blast").classes("be-quiet")
-            for each in offers:
-                act = partial(self._harden, each.name)
-                switch = ui.switch(each.label, value=each.is_taken)
+            for offer in offers:
+                act = partial(self._harden, offer.name)
+                switch = ui.switch(offer.label, value=offer.is_taken)
                 switch.on_value_change(lambda event, act=act: act(event.value))
-                switch.props("dense").classes("text-sm").tooltip(each.words)
+                switch.props("dense").classes("text-sm").tooltip(offer.words)
 
     def _offer_proposals(self, scenario: Scenario) -> None:
         """Offer rules and searches for a site; keep the choice if it is still offered."""
@@ -371,11 +371,11 @@ class WorkPanel:
             if not status.is_over:
                 bar = ui.linear_progress(show_value=False, size="8px")
                 bar.props(f'aria-label="share of {status.title}"')
-                bar.bind_value_from(card, "status", lambda each: each.share)
+                bar.bind_value_from(card, "status", lambda own: own.share)
             if _says(status):
                 refused = "be-refused" if status.state == "failed" else "be-quiet"
                 text = ui.label().classes(refused)
-                text.bind_text_from(card, "status", lambda each: each.text)
+                text.bind_text_from(card, "status", lambda part: part.text)
             with ui.row().classes("gap-1"):
                 if not status.is_over:
                     stop = ui.button("stop", icon="stop", on_click=partial(self._stop, folder))

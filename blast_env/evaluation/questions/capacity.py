@@ -107,7 +107,7 @@ class Ladder:
     @property
     def blasts(self) -> int:
         """Number of blasts so far."""
-        return sum(each is not None for each in self._blasts.values())
+        return sum(blast is not None for blast in self._blasts.values())
 
     def charge_at(self, severity: float, nearer: bool) -> Charge:
         """Return the charge that is as severe as a multiple of the mass at the same place.

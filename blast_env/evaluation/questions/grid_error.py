@@ -88,13 +88,13 @@ class GridError:
         coarse, name = blasts.coarse, name or blasts.judged
         if coarse is None:
             return None
-        numbers = [k for k, each in enumerate(blasts.threats) if each in coarse.threats]
+        numbers = [k for k, own in enumerate(blasts.threats) if own in coarse.threats]
         if not numbers or number not in (None, *numbers):
             return None
         if number is None:
             number = numbers[blasts.under(numbers).worst(name)]
         threat = blasts.threats[number]
-        fine_m, coarse_m = (each.engine.smallest_m for each in (blasts, coarse))
+        fine_m, coarse_m = (part.engine.smallest_m for part in (blasts, coarse))
         return cls(
             threat,
             blasts.layouts[name],

@@ -120,7 +120,7 @@ class SiteVerdict:
     @property
     def is_flagged(self) -> bool:
         """Whether a load behind the verdict has a note."""
-        return self.found.is_flagged or any(each.load.flagged for each in self.limited)
+        return self.found.is_flagged or any(own.load.flagged for own in self.limited)
 
     @property
     def word(self) -> str:
@@ -131,7 +131,7 @@ class SiteVerdict:
     def words(self) -> str:
         """The verdict on each requirement, such as `level of protection below Low`."""
         words = [self.found.level_words_for(self.target)] * bool(self.found.buildings)
-        exceeded = [each.threat for each in self.limited if not each.is_kept]
+        exceeded = [own.threat for own in self.limited if not own.is_kept]
         if exceeded:
             names = dict.fromkeys(exceeded)
             noun = "threat" if len(names) == 1 else "threats"

@@ -70,7 +70,7 @@ def scaled_to(judged: Consequences, charge: Charge) -> Consequences:
     It may be of another mass or at another place than the one charge of `judged`.
     """
     return Consequences(
-        tuple(_scaled(each, charge) for each in judged.responses),
+        tuple(_scaled(response, charge) for response in judged.responses),
         unchecked=judged.unchecked,
         unjudged=judged.unjudged,
     )
@@ -80,7 +80,7 @@ def _scaled(response: BuildingResponse, charge: Charge) -> BuildingResponse:
     assert response.site is not None
     facade, old = response.on_cells, response.site.charge
     site = replace(response.site, charge=charge)
-    other_m = bay_places(site, [each.bay for each in facade.bays]).distance_m
+    other_m = bay_places(site, [bay.bay for bay in facade.bays]).distance_m
     factors = load_factors(old, response.places.distance_m, charge.tnt_kg, other_m)
     histories = rescaled(facade.time_s, facade.pressure_pa, *factors)
     return replace(response, charge=charge, site=site, on_cells=respond(facade.bays, *histories))
@@ -169,8 +169,8 @@ class LevelProbability:
         found: dict[str, float] = {}
         for name, quantile in zip(_DRIVERS, self.quantiles.T, strict=True):
             classes = np.array_split(reached[np.argsort(quantile)], _BINS)
-            between = np.var([each.mean() for each in classes])
-            chance = np.mean([each.var() / max(len(each) - 1, 1) for each in classes])
+            between = np.var([class_.mean() for class_ in classes])
+            chance = np.mean([class_.var() / max(len(class_) - 1, 1) for class_ in classes])
             found[name] = max(float(between - chance), 0.0) / total
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
@@ -178,7 +178,7 @@ class LevelProbability:
         """Return the probability and what drives it: `medium with 0.84; driven by ...`."""
         text = f"{level.label!r} with {probability_text(self.of(level), len(self.levels))}"
         main = [f"{name} ({share:.1f})" for name, share in self.drivers(level).items()]
-        main = [each for each in main if not each.endswith("(0.0)")][:2]
+        main = [own for own in main if not own.endswith("(0.0)")][:2]
         return f"{text}; driven by {' and '.join(main)}" if main else text
 
 
@@ -214,8 +214,8 @@ def level_probability(
         raise BlastEnvError("no building has a facade: there is no level of protection")
     quantiles = _latin(draws, seed)
     levels = np.full(draws, int(LevelOfProtection.HIGH))
-    for each in _deciding(judged.responses, deciding):
-        each.lower(levels, uncertainty, quantiles)
+    for own in _deciding(judged.responses, deciding):
+        own.lower(levels, uncertainty, quantiles)
     return LevelProbability(levels, quantiles)
 
 
@@ -280,7 +280,7 @@ class _Component:
         facade, own_pa = self.response.on_cells, self.response.on_cells.pressure_pa[self.index]
         pushed_pa = pushes(facade.time_s, own_pa[np.newaxis])[0]
         factors = {max(self.response.peak_factor, 1.0), 1.0}
-        return [(each, factor) for each in (pushed_pa, own_pa) for factor in factors]
+        return [(own, factor) for own in (pushed_pa, own_pa) for factor in factors]
 
 
 def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Component]:
@@ -299,6 +299,6 @@ def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Co
     for own in kinds.values():
         kept: dict[int, _Component] = {}
         for name in ("damage", "peak_pa", "impulse_pa_s"):
-            for each in sorted(own, key=lambda one: -float(getattr(one, name)))[:count]:
-                kept[id(each)] = each
+            for part in sorted(own, key=lambda one: -float(getattr(one, name)))[:count]:
+                kept[id(part)] = part
         yield from kept.values()

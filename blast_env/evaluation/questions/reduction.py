@@ -90,7 +90,7 @@ def _structure_row(
     blasts: Blasts, load_of: Callable[[BlastRecord], StructureLoad], error: GridError | None
 ) -> dict[str, object]:
     """Return the row of one structure or building, whose load in a blast is given."""
-    sides = [[load_of(each) for each in own] for own in blasts.records.values()]
+    sides = [[load_of(part) for part in own] for own in blasts.records.values()]
     without, loads = sides[0], sides[-1]
     first, stood = loads[0], worst_standing(load.stood for load in loads)
 
@@ -168,8 +168,8 @@ class ThreatOutcome:
         Loads are those of an objective, that of the site unless given.
         """
         scenario, counts = blasts.scenario, objective or blasts.scenario.objective
-        charge, elsewhere = (blasts.charge(each, number) for each in _sides(blasts))
-        loads, unprotected = (blasts.records[each][number].loads for each in _sides(blasts))
+        charge, elsewhere = (blasts.charge(side, number) for side in _sides(blasts))
+        loads, unprotected = (blasts.records[side][number].loads for side in _sides(blasts))
         return cls(
             threat=blasts.threats[number],
             charge=charge,
@@ -226,12 +226,12 @@ class Evaluation:
     @property
     def cases(self) -> tuple[LoadCaseSet, ...]:
         """The cases."""
-        return tuple(each.case for each in self.every)
+        return tuple(part.case for part in self.every)
 
     @property
     def layouts(self) -> tuple[Layout, ...]:
         """The layout of each case."""
-        return tuple(each.layouts[each.judged] for each in self.every)
+        return tuple(part.layouts[part.judged] for part in self.every)
 
     @property
     def blasts(self) -> Blasts:
@@ -246,8 +246,8 @@ class Evaluation:
     @cached_property
     def grid_error(self) -> GridError | None:
         """Grid error, from the threat with the largest load; `None` without one."""
-        found = (GridError.of(each) for each in self.every)
-        return next((each for each in found if each is not None), None)
+        found = (GridError.of(part) for part in self.every)
+        return next((own for own in found if own is not None), None)
 
     @property
     def _has_one_case(self) -> bool:
@@ -257,18 +257,18 @@ class Evaluation:
     @cached_property
     def loads(self) -> FloatArray:
         """Loads on the protected structures in the unit of the objective (cases, threats)."""
-        return np.array([each.loads(each.judged) for each in self.every])
+        return np.array([part.loads(part.judged) for part in self.every])
 
     @cached_property
     def unprotected(self) -> FloatArray:
         """The same without a barrier (cases, threats)."""
-        return np.array([each.loads(each.unprotected) for each in self.every])
+        return np.array([part.loads(part.unprotected) for part in self.every])
 
     @property
     def in_range(self) -> bool:
         """Whether all blasts are in the range of the calibration."""
-        own = (record for each in self.every for record in each.records[each.judged])
-        return all(each.loads.in_range for each in own)
+        own = (record for part in self.every for record in part.records[part.judged])
+        return all(other.loads.in_range for other in own)
 
     @property
     def _is_mean(self) -> bool:
@@ -318,7 +318,7 @@ class Evaluation:
         """Grid error of the reduction, as under the worst threat; NaN without one."""
         if self.grid_error is None:
             return np.nan
-        own = next(each for each in self.every if each.coarse is not None)
+        own = next(part for part in self.every if part.coarse is not None)
 
         def value_of(record: BlastRecord, layout: Layout = ()) -> float:
             return own.case.objective_value([own.objective_of(record)], layout)
@@ -333,9 +333,7 @@ class Evaluation:
 
         def share(error: GridError) -> float:
             return error.of_load(
-                lambda each: self.case.objective_value(
-                    [self.blasts.objective_of(each)], self.layout
-                )
+                lambda own: self.case.objective_value([self.blasts.objective_of(own)], self.layout)
             )
 
         return self._error(self.load, share)
@@ -476,7 +474,7 @@ class Evaluation:
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
         impulse, without = (
-            np.mean([each.loads.module_impulse for each in self.blasts.records[side]], axis=0)
+            np.mean([record.loads.module_impulse for record in self.blasts.records[side]], axis=0)
             for side in _sides(self.blasts)
         )
         first = self.blasts.records[self.blasts.judged][0].loads
@@ -487,16 +485,16 @@ class Evaluation:
             "reduction": reductions(impulse, without),
         }
         names = ["module_id", "structure", "x_m", "y_m", *values]
-        obstacles = [obstacle_of(each) for each in scene.structures]
+        obstacles = [obstacle_of(structure) for structure in scene.structures]
         return module_table(obstacles).assign(**values)[names]
 
     @cached_property
     def threat_table(self) -> "pd.DataFrame":
         """One row per threat; see `THREAT_COLUMNS`."""
         rows = [
-            {"seed": each.threat.seed, **charge_values(each.charge), **vars(each)}
-            | {"reduction": each.reduction}
-            for each in self.outcomes
+            {"seed": outcome.threat.seed, **charge_values(outcome.charge), **vars(outcome)}
+            | {"reduction": outcome.reduction}
+            for outcome in self.outcomes
         ]
         return table_of(rows, THREAT_COLUMNS)
 
@@ -505,7 +503,7 @@ class Evaluation:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [*self.engine.caveats(self.scenario)]
         checked = self.engine.validated_range
-        own = (each.loads.structures for each in self.blasts.records[self.blasts.judged])
+        own = (record.loads.structures for record in self.blasts.records[self.blasts.judged])
         if self.engine.needs_calibration:
             checked = f"the range of calibration {self.calibration!r}"
         for of_structure in zip(*own, strict=True):

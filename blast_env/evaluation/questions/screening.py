@@ -97,12 +97,12 @@ class ThreatScreening:
     @property
     def nearest_m(self) -> float:
         """Distance of the nearest bay's middle."""
-        return min(each.distance_m for each in self.bays)
+        return min(bay.distance_m for bay in self.bays)
 
     @property
     def words(self) -> tuple[str, ...]:
         """The level of protection, the panes broken, the worst pane and the worst panel."""
-        return response_words([each.response for each in self.bays])
+        return response_words([bay.response for bay in self.bays])
 
     @property
     def may_breach(self) -> bool:
@@ -111,14 +111,18 @@ class ThreatScreening:
 
     def doubts(self, required: Sequence[Requirement]) -> str:
         """Return the conditions of a verdict on requirements, in brackets; empty without any."""
-        found = [each.response for each in self.bays]
-        rests = any(assumption_words(found, each.level) for each in required if each.level)
+        found = [bay.response for bay in self.bays]
+        rests = any(
+            assumption_words(found, requirement.level)
+            for requirement in required
+            if requirement.level
+        )
         doubts = ["may be breached"] * self.may_breach + ["rests on assumptions"] * rests
         return f" ({', '.join(doubts)})" if doubts else ""
 
     def keeps(self, requirement: Requirement) -> bool:
         """Return whether every bay keeps a requirement."""
-        return all(requirement.kept_by(each.response) for each in self.bays)
+        return all(requirement.kept_by(bay.response) for bay in self.bays)
 
 
 @dataclass(frozen=True)
@@ -169,19 +173,19 @@ class Screening:
     def stand_offs(self) -> Mapping[str, tuple[StandOff, ...]]:
         """The stand-off of each component, by the name of the threat."""
         return {
-            each.name: stand_offs(self.components, each.charge, self.storey_m)
-            for each in self.threats
+            threat.name: stand_offs(self.components, threat.charge, self.storey_m)
+            for threat in self.threats
         }
 
     def needed_m(self, threat: str, requirement: Requirement) -> float:
         """Return the stand-off at which all components of the site keep a requirement."""
-        found = next(each for each in self.threats if each.name == threat)
+        found = next(part for part in self.threats if part.name == threat)
         own = [
-            each.distances_m[requirement.level]
-            for each in self.stand_offs[threat]
-            if requirement.level in each.distances_m
-            and each.name in self.present
-            and not (requirement.glass_only and isinstance(each.component, Wall))
+            stand_off.distances_m[requirement.level]
+            for stand_off in self.stand_offs[threat]
+            if requirement.level in stand_off.distances_m
+            and stand_off.name in self.present
+            and not (requirement.glass_only and isinstance(stand_off.component, Wall))
         ]
         curves = _Curves(found.charge)
         own += [
@@ -208,7 +212,7 @@ def screen(
     """
     named = [*threats]
     sources = _by_threat(scenario, named)
-    if len({each.name for each in named}) < len(named):
+    if len({part.name for part in named}) < len(named):
         raise BlastEnvError("threats: two have the same name, must differ")
     bays = scenario.bays_with(layout)
     if not bays:
@@ -221,16 +225,18 @@ def screen(
     known_places: dict[object, Ways] = {}  # threats that differ in mass alone share them
     for name, own in sources.items():
         places = [*_places(scenario, own, layout)]
-        key = tuple((each.position_m, each.height_m) for each in places)
+        key = tuple((place.position_m, place.height_m) for place in places)
         if key not in known_places:
             known_places[key] = facade.seen_from(places)
         screened.append(_screened(name, facade, places, known_places[key]))
     named_bays = scenario.named_bays(layout)
-    storeys = [each.bay.height_m for each in bays]
+    storeys = [bay.bay.height_m for bay in bays]
     return Screening(
         tuple(screened),
         {**catalogue(), **scenario.components},
-        frozenset(name for each in named_bays for name in (each.glazing, each.wall) if name),
+        frozenset(
+            name for named_bay in named_bays for name in (named_bay.glazing, named_bay.wall) if name
+        ),
         max(set(storeys), key=storeys.count),
     )
 
@@ -265,7 +271,7 @@ class _Curves:
         """Distances, and the reflected peak and impulse there (3, distances)."""
         distances_m = np.geomspace(self.least_m, self.most_m, _DISTANCES)
         _, tnt_kg, height_m = self._charge
-        loads = (normally_reflected(each, distances_m, tnt_kg, height_m) for each in _LOADS)
+        loads = (normally_reflected(own, distances_m, tnt_kg, height_m) for own in _LOADS)
         return np.stack([distances_m, *loads])
 
     def stand_off_m(self, part: Pane | Panel, level: LevelOfProtection) -> float:
@@ -273,7 +279,7 @@ class _Curves:
         distances_m, *loads = self.reflected
 
         def keeps(index: int) -> bool:
-            found = under_triangle(part, *(float(each[index]) for each in loads))
+            found = under_triangle(part, *(float(load[index]) for load in loads))
             return level_of(damage_number(found)) >= level
 
         low, high = -1, _DISTANCES  # fails at the first, keeps at the second
@@ -312,8 +318,8 @@ class _Facade:
         cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FilledBay]
     ) -> "_Facade":
         """Return the bays that no structure covers."""
-        rectangles_m = {each.name: each.rectangle_m for each in scenario.structures}
-        middles_m, normals = bay_middles(rectangles_m, [each.bay for each in bays])
+        rectangles_m = {structure.name: structure.rectangle_m for structure in scenario.structures}
+        middles_m, normals = bay_middles(rectangles_m, [own.bay for own in bays])
         before_m = middles_m + MODULE_SIDE_M * normals
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
         free = ~_covered(site, before_m)
@@ -325,12 +331,12 @@ class _Facade:
         """Number of the kind of each bay, and the parts of each: equal parts respond equally."""
         known: dict[object, int] = {}
         numbers, parts = [], []
-        for each in self.bays:
-            key = each.glazing, each.wall, round(each.bay.height_m, 6)
+        for bay in self.bays:
+            key = bay.glazing, bay.wall, round(bay.bay.height_m, 6)
             if key not in known:
                 known[key] = len(known)
-                own: list[Pane | Panel] = [] if each.glazing is None else [each.glazing.pane]
-                own += [] if each.wall is None else [each.wall.panel(each.bay.height_m)]
+                own: list[Pane | Panel] = [] if bay.glazing is None else [bay.glazing.pane]
+                own += [] if bay.wall is None else [bay.wall.panel(bay.bay.height_m)]
                 parts.append(own)
             numbers.append(known[key])
         return np.array(numbers), parts
@@ -338,11 +344,11 @@ class _Facade:
     def seen_from(self, places: Sequence[Charge]) -> Ways:
         """Return the ways from places to the bays (places, bays)."""
         found = []
-        for each in places:
-            seen = in_sight(replace(self.site, charge=each), self.middles_m, self.outward)
-            charge_m = (*each.position_m, each.height_m)
+        for place in places:
+            seen = in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
+            charge_m = (*place.position_m, place.height_m)
             found.append(Ways.between(charge_m, self.middles_m, self.outward, seen))
-        return Ways(*(np.stack(each) for each in zip(*found, strict=True)))
+        return Ways(*(np.stack(own) for own in zip(*found, strict=True)))
 
 
 def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
@@ -360,16 +366,16 @@ def _by_threat(scenario: Scenario, named: Sequence[NamedMass]) -> dict[str, tupl
     """Return the sources of each threat: all of the site's, or those of one mass and height."""
     if named:
         return {
-            each.name: tuple(
-                source.model_copy(update={"tnt_kg": each.tnt_kg}) for source in scenario.charge
+            own.name: tuple(
+                source.model_copy(update={"tnt_kg": own.tnt_kg}) for source in scenario.charge
             )
-            for each in named
+            for own in named
         }
     found: dict[str, tuple[AnySource, ...]] = {}
     for source in scenario.charge:
         mass = f"{source.tnt_kg:g} kg"
         high = f", {source.height_m:g} m high" if source.height_m else ""
-        alike = {each.tnt_kg for each in scenario.charge if each.threat == source.threat}
+        alike = {part.tnt_kg for part in scenario.charge if part.threat == source.threat}
         called = source.threat or mass
         name = f"{called}{high}" if len(alike) == 1 or called == mass else f"{called}, {mass}{high}"
         found[name] = (*found.get(name, ()), source)
@@ -380,7 +386,7 @@ def _places(
     scenario: Scenario, sources: Sequence[AnySource], layout: Sequence[Element]
 ) -> Iterator[Charge]:
     """Yield the places of a threat, at most `_APART_M` apart if they are not too many."""
-    lengths_m = [hypot(*(b - a for a, b in zip(*_span(each), strict=True))) for each in sources]
+    lengths_m = [hypot(*(b - a for a, b in zip(*_span(own), strict=True))) for own in sources]
     apart_m = max(_APART_M, sum(lengths_m) / _MOST_PLACES)
     for source, length_m in zip(sources, lengths_m, strict=True):
         points: Iterable[PointM]
@@ -413,13 +419,13 @@ def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
 def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) -> ThreatScreening:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
     _, tnt_kg, height_m = places[0]
-    peaks, impulses = (in_the_open(each, ways, tnt_kg, height_m) for each in _LOADS)
+    peaks, impulses = (in_the_open(part, ways, tnt_kg, height_m) for part in _LOADS)
     numbers, parts = facade.kinds
     damage = np.zeros(peaks.shape)
     for kind, own in enumerate(parts):
         which = numbers == kind
         damage[:, which] = _tabulated(own, peaks[:, which], impulses[:, which])
-    order = [(int(each.max()), float(each.sum())) for each in damage]
+    order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
     bays = []
     for index, filled in enumerate(facade.bays):
@@ -437,8 +443,8 @@ def _tabulated(
     from scipy.interpolate import RegularGridInterpolator  # takes a while to import
 
     logarithms = np.log(peak_pa), np.log(impulse_pa_s)
-    axes = [np.linspace(each.min(), each.max() + 1e-6, _POINTS) for each in logarithms]
-    peaks, impulses = (np.exp(each).tolist() for each in axes)
+    axes = [np.linspace(axis.min(), axis.max() + 1e-6, _POINTS) for axis in logarithms]
+    peaks, impulses = (np.exp(axis).tolist() for axis in axes)
     table = [
         [
             max(damage_number(under_triangle(part, peak, impulse)) for part in parts)

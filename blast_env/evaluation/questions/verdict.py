@@ -124,13 +124,13 @@ class BuildingResponse:
     def places(self) -> BayPlaces:
         """The distances of its bays from the charge, and whether it sees them."""
         assert self.site is not None, "the response was made without a site"
-        return bay_places(self.site, [each.bay for each in self.on_cells.bays])
+        return bay_places(self.site, [bay.bay for bay in self.on_cells.bays])
 
     @cached_property
     def standings(self) -> tuple[ReasonedStanding, ...]:
         """The standing of the load on each bay."""
         assert self.site is not None, "the response was made without a site"
-        bays = [each.bay for each in self.on_cells.bays]
+        bays = [bay.bay for bay in self.on_cells.bays]
         return bay_standings(self.site, bays, cells_of(self.peak_factor), self.known)
 
     @property
@@ -143,7 +143,7 @@ class BuildingResponse:
         """The index of the bay with the worst component."""
         facade = self.facade
         glass, walls = facade.glazing.hazard, facade.walls.damage
-        worst_glass, worst_wall = (float(each.max(initial=-1.0)) for each in (glass, walls))
+        worst_glass, worst_wall = (float(own.max(initial=-1.0)) for own in (glass, walls))
         if worst_glass >= worst_wall:
             return int(facade.glazed[int(glass.argmax())])
         return int(facade.walled[int(walls.argmax())])
@@ -165,7 +165,7 @@ class BuildingResponse:
         """Severity of the response; its load is the mean impulse on the bays by area, Pa s."""
         facade = self.facade
         impulses_pa_s = impulses(facade.time_s, facade.pressure_pa).max(axis=1)
-        areas_m2 = [each.bay.area_m2 for each in facade.bays]
+        areas_m2 = [bay.bay.area_m2 for bay in facade.bays]
         return Severity(
             4 - facade.level_of_protection,
             facade.total_damage,
@@ -260,29 +260,31 @@ class Consequences:
         """Combine the consequences of several charges."""
         every = list(parts)
         return cls(
-            tuple(each for part in every for each in part.responses),
-            tuple(each for part in every for each in part.neighbours),
-            tuple(each for part in every for each in part.barriers),
-            tuple(each for part in every for each in part.unchecked),
-            tuple(dict.fromkeys(each for part in every for each in part.unjudged)),
+            tuple(response for part in every for response in part.responses),
+            tuple(neighbour for part in every for neighbour in part.neighbours),
+            tuple(barrier for part in every for barrier in part.barriers),
+            tuple(own for part in every for own in part.unchecked),
+            tuple(dict.fromkeys(walls for part in every for walls in part.unjudged)),
         )
 
     @property
     def worst_number(self) -> int:
         """The number of the charge with the governing response."""
-        worst = max(self.responses, key=lambda each: each.severity)
+        worst = max(self.responses, key=lambda own: own.severity)
         return self.responses.index(worst) // len(self.buildings)
 
     @property
     def buildings(self) -> tuple[str, ...]:
         """The buildings with a facade, in the order of the scenario."""
-        return tuple(dict.fromkeys(each.building for each in self.responses))
+        return tuple(dict.fromkeys(response.building for response in self.responses))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on a verdict: walls not covered, oblique walls, loads out of range or not known."""
-        stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
-        notes = [f"{each.building}: {each.words}" for each in self.unjudged]
+        stepped = dict.fromkeys(
+            response.building for response in self.responses if response.stepped
+        )
+        notes = [f"{walls.building}: {walls.words}" for walls in self.unjudged]
         notes += self._thin
         notes += [f"{name}: {STEPPED}" for name in stepped]
         reasons: dict[str, list[str]] = {}
@@ -303,15 +305,15 @@ class Consequences:
 
     @property
     def _known(self) -> list[bool]:
-        return [is_known for each in self.responses for is_known in each.known.values()]
+        return [is_known for response in self.responses for is_known in response.known.values()]
 
     @property
     def _thin(self) -> list[str]:
         """Notes on interlayers that are thinner than those of arena tests."""
         found = dict.fromkeys(
-            (each.building, thin_mm)
-            for each in self.responses
-            for thin_mm in each.on_cells.thin_interlayers
+            (response.building, thin_mm)
+            for response in self.responses
+            for thin_mm in response.on_cells.thin_interlayers
         )
         return [
             f"{building}: panes laminated with {thin_mm:g} mm: in arena tests interlayers under"
@@ -322,7 +324,7 @@ class Consequences:
     @property
     def force_words(self) -> str:
         """The largest forces that frames and connections have to carry, in a sentence."""
-        return force_words(each.facade for each in self.responses)
+        return force_words(response.facade for response in self.responses)
 
     @property
     def is_flagged(self) -> bool:
@@ -330,7 +332,7 @@ class Consequences:
         return (
             any(building in self.buildings for building, _ in self.unchecked)
             or bool(self.unjudged or self._thin)
-            or any(each.stepped for each in self.responses)
+            or any(response.stepped for response in self.responses)
             or not all(self._known)
         )
 
@@ -341,19 +343,19 @@ class Consequences:
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return the responses of one building."""
-        return tuple(each for each in self.responses if each.building == building)
+        return tuple(response for response in self.responses if response.building == building)
 
     def level(self, building: str) -> LevelOfProtection:
         """Return the lowest level of protection of a building under any charge."""
-        return min(each.facade.level_of_protection for each in self.of(building))
+        return min(own.facade.level_of_protection for own in self.of(building))
 
     def level_on_cells(self, building: str) -> LevelOfProtection:
         """Return the lowest level from the histories on the cells, which clip peaks."""
-        return min(each.on_cells.level_of_protection for each in self.of(building))
+        return min(own.on_cells.level_of_protection for own in self.of(building))
 
     def standing(self, building: str) -> ReasonedStanding:
         """Return the standing of the load on the bay that decides under the worst charge."""
-        worst = max(self.of(building), key=lambda each: each.severity)
+        worst = max(self.of(building), key=lambda own: own.severity)
         return worst.standings[worst.deciding_bay]
 
     def level_words(self, building: str) -> str:
@@ -363,14 +365,16 @@ class Consequences:
 
     def summary(self, building: str) -> BuildingSummary:
         """Return the response of a building under the worst charge, number by number."""
-        found = [each.facade for each in self.of(building)]
+        found = [own.facade for own in self.of(building)]
         walled = len(found[0].walled)
-        hazardous = [[each >= DamageLevel.HAZARDOUS for each in one.walls.levels] for one in found]
+        hazardous = [
+            [level >= DamageLevel.HAZARDOUS for level in one.walls.levels] for one in found
+        ]
         return BuildingSummary(
             level=self.level_words(building),
-            broken=max(each.broken_panes for each in found),
+            broken=max(part.broken_panes for part in found),
             panes=found[0].panes,
-            condition=max(each.worst_condition for each in found).words
+            condition=max(other.worst_condition for other in found).words
             if found[0].panes
             else _NONE,
             failed=max(map(sum, hazardous)),
@@ -380,11 +384,13 @@ class Consequences:
 
     def worst_damage(self, scenario: Scenario) -> float:
         """Return the worst damage of the protected buildings in the objective, from 0 to 5."""
-        names = {each.building_name for each in scenario.structures if each.protected}
-        own = [each.facade for each in self.responses if each.building in names]
+        names = {
+            structure.building_name for structure in scenario.structures if structure.protected
+        }
+        own = [response.facade for response in self.responses if response.building in names]
         if scenario.objective.measure == "glazing":
-            return worst(float(each.glazing.hazard.max(initial=0.0)) for each in own)
-        return worst(each.worst_number for each in own)
+            return worst(float(other.glazing.hazard.max(initial=0.0)) for other in own)
+        return worst(part.worst_number for part in own)
 
     def passes_on_cells(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under the clipped peaks on the cells."""
@@ -398,21 +404,21 @@ class Consequences:
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
         """Each building without a facade, under the charge that would damage a house there most."""
         found: dict[str, list[Neighbour]] = {}
-        for each in self.neighbours:
-            found.setdefault(each.building, []).append(each)
+        for neighbour in self.neighbours:
+            found.setdefault(neighbour.building, []).append(neighbour)
         major = BuildingDamage.MAJOR
         return tuple(
-            max(own, key=lambda each: (each.probability[major], each.impulse_pa_s))
+            max(own, key=lambda part: (part.probability[major], part.impulse_pa_s))
             for own in found.values()
         )
 
     @property
     def worst_barrier(self) -> BarrierResponse | None:
         """The barrier under the charge that tilts a piece most; `None` without pieces."""
-        standing = (each for each in self.barriers if len(each.pieces))
+        standing = (barrier for barrier in self.barriers if len(barrier.pieces))
         return max(
             standing,
-            key=lambda each: (each.pieces["tilt"].max(), each.pieces["tilt"].sum()),
+            key=lambda own: (own.pieces["tilt"].max(), own.pieces["tilt"].sum()),
             default=None,
         )
 
@@ -434,7 +440,7 @@ class Consequences:
         If that rests on assumed properties of components, the words name these.
         """
         side = "at least" if self.passes(target) else "below"
-        rests = assumption_words((each.facade for each in self.responses), target)
+        rests = assumption_words((response.facade for response in self.responses), target)
         return f"level of protection {side} {target.title}" + (f" ({rests})" if rests else "")
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
@@ -443,17 +449,17 @@ class Consequences:
             self,
             responses=tuple(
                 replace(
-                    each,
+                    response,
                     on_cells=respond(
                         [
                             replace(bay, glazing=bay.glazing and with_glass(bay.glazing, glazing))
-                            for bay in each.on_cells.bays
+                            for bay in response.on_cells.bays
                         ],
-                        each.on_cells.time_s,
-                        each.on_cells.pressure_pa,
+                        response.on_cells.time_s,
+                        response.on_cells.pressure_pa,
                     ),
                 )
-                for each in self.responses
+                for response in self.responses
             ),
         )
 
@@ -461,7 +467,7 @@ class Consequences:
 def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
     """Return the possible replacement windows: those of the scenario and of the catalogue."""
     known = {**catalogue(), **scenario.components}
-    return {name: each for name, each in known.items() if isinstance(each, Glazing)}
+    return {name: own for name, own in known.items() if isinstance(own, Glazing)}
 
 
 BAY_CASE_COLUMNS: Final = (
@@ -475,10 +481,10 @@ BAY_CASE_COLUMNS: Final = (
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     """Return one row per layout (by its name), charge and bay; see `BAY_CASE_COLUMNS`."""
     rows = [
-        {"layout": name} | charge_values(each.charge) | row
+        {"layout": name} | charge_values(response.charge) | row
         for name, judged in found.items()
-        for each in judged.responses
-        for row in each.rows
+        for response in judged.responses
+        for row in response.rows
     ]
     return table_of(rows, BAY_CASE_COLUMNS)
 
@@ -529,13 +535,13 @@ def response_to(
 ) -> Consequences:
     """Return the consequences of one blast with the charge at its place; see `consequences_of`."""
     details = record.complete
-    standing = tuple(each for each in load_relevant(layout) if each not in record.taken_away)
+    standing = tuple(own for own in load_relevant(layout) if own not in record.taken_away)
     responses: list[BuildingResponse] = []
     if record.bays:
-        bays = {each.bay.name: each for each in scenario.bays_with(layout)}
+        bays = {part.bay.name: part for part in scenario.bays_with(layout)}
         if not bays.keys() >= {*record.bays}:
             raise BlastEnvError("the bays of the record are those of another facade")
-        facade = respond([bays[each] for each in record.bays], record.time_s, record.pressure_pa)
+        facade = respond([bays[bay] for bay in record.bays], record.time_s, record.pressure_pa)
         site = build_site(scenario, standing, 0, charge)
         responses = by_building(scenario, facade, site, details.peak_factor, details.known)
     assert record.pieces is not None
@@ -561,14 +567,14 @@ def by_building(
     """
     names = scenario.building_names
     stepped = stepped_buildings(scenario.structures)
-    owners = [names[each.bay.structure] for each in facade.bays]
+    owners = [names[bay.bay.structure] for bay in facade.bays]
     found = []
     for building in dict.fromkeys(owners):
         own = np.flatnonzero(np.array([owner == building for owner in owners]))
         part = respond(
             [facade.bays[index] for index in own.tolist()], facade.time_s, facade.pressure_pa[own]
         )
-        inside = {each.bay.name: known[each.bay.name] for each in part.bays if known}
+        inside = {bay.bay.name: known[bay.bay.name] for bay in part.bays if known}
         is_stepped = building in stepped
         found.append(
             BuildingResponse(building, site.charge, part, peak_factor, inside, is_stepped, site)
@@ -598,7 +604,7 @@ def neighbours_of(
     """
     found = []
     for building, parts in buildings_of(scenario.structures).items():
-        if building not in walls or any(each.facade is not None for each in parts):
+        if building not in walls or any(part.facade is not None for part in parts):
             continue
         load = walls[building]
         peak = side_on_peak_pa(np.array([load.peak_pa]))
