@@ -13,13 +13,12 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from blast_env.app.kept import StoredRecord, read_kept, write_kept
-from blast_env.app.work import StatusWriter
+from blast_env.app.work import BlastingTask, StatusWriter
 from blast_env.evaluation import BlastStore, LoadCase
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult, RecordedBlast
 from blast_env.files import make_folder, write_atomically
 from blast_env.gas.engine import Recorders
-from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.layout.placement import load_relevant
 from blast_env.plots.figures import save_figure
@@ -30,7 +29,7 @@ from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.style import render_extra
 from blast_env.provenance import versions
 from blast_env.runner import share_of
-from blast_env.site import Scenario, load_scenario
+from blast_env.site import load_scenario
 from blast_env.units import PA_PER_KPA
 
 with render_extra():
@@ -99,22 +98,14 @@ PICTURES: Final = "pictures.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class BlastTask:
+class BlastTask(BlastingTask):
     """Blasts of one layout, one per threat.
 
     Attributes:
-        site: The site.
-        threats: The threats.
-        cache: Folder of the store of blasts.
-        cells: The cells.
         layout: The layout.
         blasts: Folder for the pictures of blasts, each under its key.
     """
 
-    site: Scenario
-    threats: tuple[LoadCase, ...]
-    cache: Path
-    cells: Cells
     layout: Layout
     blasts: Path
 

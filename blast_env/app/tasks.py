@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Final
 from blast_env.answers.document import AnyPart, Document
 from blast_env.app import placing
 from blast_env.app.kept import write_kept
-from blast_env.app.work import ANSWER, Answer, Question, StatusWriter
+from blast_env.app.work import ANSWER, Answer, BlastingTask, Question, StatusWriter
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
 from blast_env.design.search.registry import proposer_row
-from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.blasts import NO_BARRIER
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario
@@ -31,22 +30,14 @@ _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchTask:
+class SearchTask(BlastingTask):
     """A search for a layout, or a proposal without a blast.
 
     Attributes:
-        site: The site.
-        threats: The threats: a single one is known, several are hidden.
-        cache: Folder for the loads of blasts.
-        cells: The cells of the page; the search has cells twice as large.
         method: Name of the proposer.
         budget: Most blasts; 0 for a proposer that runs none.
     """
 
-    site: Scenario
-    threats: tuple[LoadCase, ...]
-    cache: Path
-    cells: Cells
     method: str
     budget: int
 
@@ -104,14 +95,10 @@ class SearchTask:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnswerTask:
+class AnswerTask(BlastingTask):
     """A question on a layout.
 
     Attributes:
-        site: The site.
-        threats: The threats.
-        cache: Folder for the loads of blasts.
-        cells: The cells; a search of advice has cells twice as large.
         layout: The layout.
         name: Its name.
         question: The question.
@@ -121,10 +108,6 @@ class AnswerTask:
         budget: Most blasts of a search of advice.
     """
 
-    site: Scenario
-    threats: tuple[LoadCase, ...]
-    cache: Path
-    cells: Cells
     layout: Layout
     name: str
     question: Question

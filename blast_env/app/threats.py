@@ -45,7 +45,7 @@ def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
                 (", upper right", (right, top)),
             ]
         elif isinstance(source, VehicleSource):
-            named += _of_vehicle(f"charge {index + 1}", source)
+            named += _of_vehicle(index, source)
             continue
         else:
             places = [("", source.position_m)]
@@ -53,16 +53,18 @@ def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
             LoadCase(
                 name=f"charge {index + 1}{words}",
                 charge=Charge(at_m, source.tnt_kg, source.height_m),
+                source=index,
             )
             for words, at_m in places
         ]
     return tuple(named)
 
 
-def _of_vehicle(name: str, source: VehicleSource) -> Iterator[LoadCase]:
+def _of_vehicle(index: int, source: VehicleSource) -> Iterator[LoadCase]:
     for rank in range(source.places):
         words = _NEAREST if rank == 0 else f", place {rank + 1} by distance"
-        yield LoadCase(name=f"{name}{words}", charge=VehicleCharge(source, rank))
+        charge = VehicleCharge(source, rank)
+        yield LoadCase(charge, name=f"charge {index + 1}{words}", source=index)
 
 
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
@@ -71,9 +73,9 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
     Of each source, the place with the least scaled stand-off, the first of equals; of a vehicle,
     the nearest one. Of more than `MOST_USUAL` sources without a vehicle, those with the least.
     """
-    sources: dict[str, list[LoadCase]] = {}
+    sources: dict[int, list[LoadCase]] = {}
     for threat in threats_of(scenario):
-        sources.setdefault(threat.name.partition(",")[0], []).append(threat)
+        sources.setdefault(threat.source, []).append(threat)
 
     def severity(threat: LoadCase) -> float:
         charge = threat.charge
@@ -82,6 +84,6 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
         return -stand_off_m(scenario.loaded_walls, charge.position_m) / cbrt(charge.tnt_kg)
 
     chosen = [max(own, key=severity) for own in sources.values()]
-    fixed = [part for part in chosen if not isinstance(part.charge, VehicleCharge)]
+    fixed = [threat for threat in chosen if not isinstance(threat.charge, VehicleCharge)]
     worst = sorted(fixed, key=severity, reverse=True)[:MOST_USUAL]
-    return tuple(other.name for other in chosen if other in worst or other not in fixed)
+    return tuple(threat.name for threat in chosen if threat in worst or threat not in fixed)

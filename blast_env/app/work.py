@@ -1,6 +1,7 @@
 """Work requested on the page: its progress and its answers, as files that survive a kill."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from time import monotonic, time
@@ -9,6 +10,9 @@ from typing import Any, Final, Literal, TypeAlias
 from blast_env.answers.document import Document
 from blast_env.app.kept import MOST_BYTES, StoredRecord, write_kept
 from blast_env.documents import check_values, read_text
+from blast_env.evaluation import LoadCase
+from blast_env.gas.settings import Cells
+from blast_env.site import Scenario
 
 STATUS: Final = "status.json"
 ANSWER: Final = "answer.json"
@@ -112,6 +116,23 @@ class StatusWriter:
 
 Task: TypeAlias = Callable[[StatusWriter], None]
 """Work for a process: it pickles, and may be interrupted anywhere by `KeyboardInterrupt`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlastingTask:
+    """What all work with blasts has.
+
+    Attributes:
+        site: The site.
+        threats: The threats: a single one is known, several are hidden.
+        cache: Folder of the store of blasts.
+        cells: The cells of the page; a search has cells twice as large.
+    """
+
+    site: Scenario
+    threats: tuple[LoadCase, ...]
+    cache: Path
+    cells: Cells
 
 
 class Question(StrEnum):

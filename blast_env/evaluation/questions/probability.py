@@ -169,16 +169,16 @@ class LevelProbability:
         found: dict[str, float] = {}
         for name, quantile in zip(_DRIVERS, self.quantiles.T, strict=True):
             classes = np.array_split(reached[np.argsort(quantile)], _BINS)
-            between = np.var([class_.mean() for class_ in classes])
-            chance = np.mean([class_.var() / max(len(class_) - 1, 1) for class_ in classes])
+            between = np.var([members.mean() for members in classes])
+            chance = np.mean([members.var() / max(len(members) - 1, 1) for members in classes])
             found[name] = max(float(between - chance), 0.0) / total
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def words(self, level: LevelOfProtection) -> str:
         """Return the probability and what drives it: `medium with 0.84; driven by ...`."""
         text = f"{level.label!r} with {probability_text(self.of(level), len(self.levels))}"
-        main = [f"{name} ({share:.1f})" for name, share in self.drivers(level).items()]
-        main = [own for own in main if not own.endswith("(0.0)")][:2]
+        drivers = self.drivers(level).items()
+        main = [f"{name} ({share:.1f})" for name, share in drivers if round(share, 1) > 0.0][:2]
         return f"{text}; driven by {' and '.join(main)}" if main else text
 
 
