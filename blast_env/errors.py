@@ -13,6 +13,10 @@ class BlastEnvError(ValueError):
     """Base class: an input of the user is not usable."""
 
 
+class BlastEnvWarning(UserWarning):
+    """Base class: a note to the user on a result or a file; commands print it as one line."""
+
+
 class LayoutError(BlastEnvError):
     """A cell cannot take a module: because of site, modules, stock, budget or access way."""
 

@@ -12,7 +12,7 @@ from threading import RLock
 from time import monotonic, sleep
 from typing import Any, Final, TypeVar
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.files import make_folder
 
 T = TypeVar("T")
@@ -158,7 +158,7 @@ class Store:
         return count
 
     def _note(self, words: str) -> None:
-        warnings.warn(f"{self.path}: {words}", RuntimeWarning, stacklevel=4)
+        warnings.warn(f"{self.path}: {words}", BlastEnvWarning, stacklevel=4)
 
     def _tidy_up(self, most_bytes: int) -> None:
         """Delete the oldest entries, if all together exceed the bound."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.files import is_temporary, make_folder, write_atomically
 from blast_env.store import Store
 from tests.attack.disks import file_size_limit
@@ -169,7 +169,7 @@ def test_a_damaged_content_goes(tmp_path: Path) -> None:
         other.execute("UPDATE contents SET content = ? WHERE key = 'key 1'", (b"other",))
         other.execute("UPDATE contents SET key = 'key 9' WHERE key = 'key 2'")
         other.commit()
-    with pytest.warns(RuntimeWarning, match="has a damaged entry"):
+    with pytest.warns(BlastEnvWarning, match="has a damaged entry"):
         assert store.get("key 1") is None
     assert store.get("key 9") is None  # of another key
     assert store.damaged == 2
@@ -180,7 +180,7 @@ def test_content_that_cannot_be_decoded_counts_as_damaged(tmp_path: Path) -> Non
     store = Store(tmp_path / "store")
     store.put("key", b"3.5")
     assert store.read("key", float) == 3.5
-    with pytest.warns(RuntimeWarning, match="has a damaged entry"):
+    with pytest.warns(BlastEnvWarning, match="has a damaged entry"):
         assert store.read("key", int) is None
     assert store.damaged == 1
     assert store.read("key", float) is None
@@ -315,7 +315,7 @@ def test_a_store_that_has_lost_its_content_says_so_once(content: bytes, tmp_path
     for path in tmp_path.iterdir():
         path.unlink()
     (tmp_path / "a.sqlite").write_bytes(content)
-    with pytest.warns(RuntimeWarning, match=r"a\.sqlite: has lost its content") as notes:
+    with pytest.warns(BlastEnvWarning, match=r"a\.sqlite: has lost its content") as notes:
         store = Store(tmp_path / "a.sqlite")
     assert len(notes) == 1
     assert store.get("key") is None
@@ -330,7 +330,7 @@ def test_damaged_entries_are_one_note(tmp_path: Path) -> None:
     with closing(sqlite3.connect(tmp_path / "a.sqlite")) as other:
         other.execute("UPDATE contents SET content = x'00' WHERE key != 'c'")
         other.commit()
-    with pytest.warns(RuntimeWarning, match=r"a\.sqlite: has a damaged entry") as notes:
+    with pytest.warns(BlastEnvWarning, match=r"a\.sqlite: has a damaged entry") as notes:
         assert [store.get(key) for key in "abc"] == [None, None, b"content"]
     assert (len(notes), store.damaged) == (1, 2)
 

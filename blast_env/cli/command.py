@@ -143,9 +143,9 @@ class ShellCommand(TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         # Here, because the list of commands is shown without this import.
-        from blast_env.cli.output import user_errors
+        from blast_env.cli.output import plain_notes, user_errors
 
-        with user_errors(), checked_targets(ctx.meta.get(_TARGETS, ())):
+        with user_errors(), plain_notes(), checked_targets(ctx.meta.get(_TARGETS, ())):
             return super().invoke(ctx)
 
 

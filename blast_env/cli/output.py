@@ -1,11 +1,12 @@
 """Output of all commands: consoles, tables, errors, a progress bar."""
 
 import json
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TextIO
 
 import typer
 from rich.console import Console
@@ -13,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.answers.terminal import plain_console, print_line
 from blast_env.cli.interruptions import Interruptions
-from blast_env.errors import BlastEnvError, MissingExtraError
+from blast_env.errors import BlastEnvError, BlastEnvWarning, MissingExtraError
 from blast_env.gas.cost import CostGuess, cost_words
 from blast_env.geometry import Element
 from blast_env.site import Scenario
@@ -75,6 +76,31 @@ def user_errors() -> Iterator[None]:
     message_console().print(printable(f"interrupted: {text}"), style="yellow")
     interruptions.settle(is_told=True)
     raise typer.Exit(interruptions.exit_code)
+
+
+@contextmanager
+def plain_notes() -> Iterator[None]:
+    """Print each `BlastEnvWarning` of the block as one line, without its place in the program."""
+    before = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, BlastEnvWarning):
+            message_console().print(printable(f"note: {message}"), style="yellow")
+        else:
+            before(message, category, filename, lineno, file, line)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = before
 
 
 @contextmanager

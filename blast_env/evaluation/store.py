@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError, BlastEnvWarning, value_text
 from blast_env.evaluation.record import KEY, BlastKey, BlastLoads, BlastRecord
 from blast_env.site import AnyScenario, find_scenario
 from blast_env.store import Store
@@ -102,7 +102,7 @@ class BlastStore:
         try:
             self._file.put(key.text, record.encoded())
         except BlastEnvError as error:
-            warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=3)
+            warnings.warn(f"a blast is not kept: {error}", BlastEnvWarning, stacklevel=3)
 
     def remember(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast in memory only."""
@@ -120,7 +120,7 @@ class BlastStore:
         try:
             found = self._file.read(key.text, BlastRecord.decoded)
         except BlastEnvError as error:
-            warnings.warn(f"a blast counts as missing: {error}", RuntimeWarning, stacklevel=3)
+            warnings.warn(f"a blast counts as missing: {error}", BlastEnvWarning, stacklevel=3)
             return None
         is_known = found is not None and (
             scenario is None or found.loads.are_for(find_scenario(scenario))

@@ -28,6 +28,7 @@ from blast_env.app.folder import DesignFolder
 from blast_env.app.kept import read_kept, write_kept
 from blast_env.app.work import Answer, Question
 from blast_env.cluster import address_of
+from blast_env.errors import BlastEnvWarning
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastStore
@@ -175,7 +176,7 @@ def _loads(folder: Path) -> Format:
     path = folder / "blasts.sqlite"
 
     def read(_: Path) -> Any:
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+        with warnings.catch_warnings(action="ignore", category=BlastEnvWarning):
             loads = BlastStore(folder).get(key)
         return None if loads is None else (loads.structures, loads.module_impulse.tobytes())
 

@@ -1,11 +1,17 @@
-"""Values of options: numbers that are refused, alone and with commas."""
+"""All commands: numbers that are refused, alone and with commas; notes."""
+
+import warnings
+from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from blast_env.cli import app
+from blast_env.cli.command import ShellCommand
 from blast_env.cli.options import numbers
 from blast_env.errors import BlastEnvError
+from blast_env.store import Store
 
 
 @pytest.mark.parametrize(
@@ -31,3 +37,21 @@ def test_numbers_in_another_form_are_refused(text: str) -> None:
     with pytest.raises(BlastEnvError) as caught:
         numbers("--at", text, "X,Y")
     assert str(caught.value) == f"--at is {text!r}, must be two numbers as X,Y"
+
+
+def test_a_note_of_a_store_is_one_plain_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.sqlite"
+    path.write_bytes(b"")
+
+    def work() -> None:
+        assert Store(path).get("key") is None
+
+    command = typer.Typer()
+    command.command(cls=ShellCommand)(work)
+    before = warnings.showwarning
+    with warnings.catch_warnings(action="default"):
+        result = CliRunner().invoke(command)
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert result.stderr.startswith(f"note: {path}: has lost its content")
+    assert result.stderr.count("\n") == 1
+    assert warnings.showwarning is before

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blast_env import Charge
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.evaluation import (
     BlastEvaluator,
     BlastKey,
@@ -100,7 +100,7 @@ def test_a_file_that_cannot_be_written_costs_a_warning_and_no_result(tmp_path: P
     evaluator = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
     with (
         file_size_limit(1000),
-        pytest.warns(RuntimeWarning, match=r"a blast is not kept: .*blasts.sqlite: cannot be used"),
+        pytest.warns(BlastEnvWarning, match="a blast is not kept: .*sqlite: cannot be used"),
     ):
         evaluator.loads(*PAIRS[0])
     assert evaluator.counts.blasts == 1
@@ -112,7 +112,7 @@ def test_a_file_that_is_damaged_later_costs_warnings_and_no_result(tmp_path: Pat
     with closing(sqlite3.connect(tmp_path / "blasts.sqlite")) as other:
         other.execute("DROP TABLE contents")
         other.commit()
-    with pytest.warns(RuntimeWarning) as warned:
+    with pytest.warns(BlastEnvWarning) as warned:
         assert same(again.loads(*PAIRS[0]), first)
     words = [str(each.message)[:25] for each in warned]
     assert words == ["a blast counts as missing", "a blast is not kept: " + words[1][21:]]
@@ -149,7 +149,7 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
         assert cache.get(key(0)) is not None
         assert cache.get(key(0)._replace(seed=1)) is None
     else:
-        with pytest.warns(RuntimeWarning, match="has a damaged entry, which counts as missing"):
+        with pytest.warns(BlastEnvWarning, match="has a damaged entry, which counts as missing"):
             assert cache.get(key(0)) is None
         assert (cache.damaged, len(cache)) == (1, 0)
 

@@ -17,7 +17,7 @@ from typing import Final, Literal, overload
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.statistics import Estimate
 from blast_env.values import Numbers, checked_array, first_bad
 
@@ -30,7 +30,7 @@ LEAST_DISTANCES: Final = 4
 _CONSTANT: Final = 1e-12  # relative spread up to which numbers count as equal
 
 
-class FewDistancesWarning(UserWarning):
+class FewDistancesWarning(BlastEnvWarning):
     """A law was fitted on fewer than `LEAST_DISTANCES` distances."""
 
 
