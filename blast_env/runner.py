@@ -1,26 +1,20 @@
 """Independent pieces of work in parallel, on this machine or on a cluster (`on_cluster`)."""
 
 import os
-import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
-from functools import cache, partial
-from multiprocessing import resource_tracker
-from threading import Thread
-from time import sleep
-from typing import Any, Final, Literal, TypeVar, overload
+from functools import partial
+from typing import Any, Literal, TypeVar, overload
 from warnings import catch_warnings, simplefilter
 
 import joblib
 
 from blast_env.errors import BlastEnvError
+from blast_env.processes import end_with, uninterrupted
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-_WATCH_S: Final = 1.0
 
 ProgressCallback = Callable[[float], None]
 """A callback for the finished share of some work, 0 to 1."""
@@ -121,39 +115,8 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
 def _watched(function: Callable[[Any], Any], parent: int, host: str, item: Any) -> Any:
     """Do an item in a worker, which ends with the process that started it."""
     if os.getppid() == parent and socket.gethostname() == host:
-        _end_with(parent)
+        end_with(parent)
     return function(item)
-
-
-@cache
-def _end_with(parent: int) -> None:
-    """End this process when its parent, a process that may have been killed, has ended."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            sleep(_WATCH_S)
-        os._exit(1)
-
-    Thread(target=watch, daemon=True).start()
-
-
-@contextmanager
-def _uninterrupted_workers() -> Iterator[None]:
-    """Keep SIGINT from the processes that this thread starts in the block, and from their own.
-
-    A terminal sends Ctrl-C to all processes of a command, and a worker that is importing would
-    print a traceback. This process alone is interrupted, after the block, and ends its workers. On
-    Windows, where a thread cannot block a signal, the block does nothing.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    resource_tracker.ensure_running()  # in the block, Python 3.11 would lift the mask to start it
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _processes(workers: int, items: int) -> int:
@@ -170,7 +133,7 @@ def _parallel(
     parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
     watched = partial(_watched, function, os.getpid(), socket.gethostname())
     try:
-        with _uninterrupted_workers():
+        with uninterrupted():
             found = parallel(joblib.delayed(watched)(item) for item in items)
         try:
             for result in found:  # noqa: UP028  # `yield from` would close with the warning

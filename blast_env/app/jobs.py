@@ -25,6 +25,7 @@ from typing import Final
 from blast_env.app.work import Status, StatusWriter, Task, end, read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
+from blast_env.processes import FORK_SERVER, start_fork_server
 
 _GRACE_S: Final = 5.0
 """Time allowed for work to stop with the server before its process is killed."""
@@ -32,8 +33,8 @@ _GRACE_S: Final = 5.0
 _MOST_READINGS: Final = 2
 _WARM: Final = "blast_env.app.warm"
 _CONTEXT: Final = (
-    multiprocessing.get_context("forkserver")
-    if os.name == "posix"
+    multiprocessing.get_context(FORK_SERVER)
+    if FORK_SERVER in multiprocessing.get_all_start_methods()
     else multiprocessing.get_context("spawn")
 )
 
@@ -69,6 +70,13 @@ def _work(folder: Path, task: Task, stop: Connection) -> None:
     Thread(target=wait, daemon=True).start()
     with suppress(KeyboardInterrupt):  # one that came after the end
         do(folder, task)
+
+
+def _load() -> None:
+    """Start the server of the processes, and wait until it has loaded everything."""
+    with suppress(OSError, EOFError):  # it has ended; each task says so
+        start_fork_server([_WARM])
+        _CONTEXT.Process(target=int, daemon=True).start()
 
 
 @dataclass
@@ -136,9 +144,7 @@ class Workers:
 
     def prepare(self) -> None:
         """Begin to load modules and compiled code, so that tasks need not; they wait until then."""
-        _CONTEXT.set_forkserver_preload([_WARM])
-        process = _CONTEXT.Process(target=int, daemon=True)
-        self._loading = Thread(target=process.start, daemon=True)  # it takes seconds
+        self._loading = Thread(target=_load, daemon=True)  # it takes seconds
         self._loading.start()
 
     def begin(self, task: Task, jobs: Path, title: str) -> Path:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -24,6 +23,7 @@ from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.store import BlastStore
+from blast_env.processes import start_fork_server
 from blast_env.runner import configured_workers
 from blast_env.values import checked_seed, whole_number
 
@@ -91,9 +91,6 @@ _MOST_BYTES: Final = 2_000_000_000
 
 REDUCTION: Final = ("reduction",)
 """Values of an episode's final information that the table of episodes has, too."""
-
-_FORK_SERVER: Final = "forkserver"
-"""Start method of stable-baselines3's processes on systems that support it."""
 
 
 class BatchVecEnv(VecEnv):
@@ -310,7 +307,6 @@ def _parallel(
     makers = [EnvironmentMaker(configuration, source, index, blasts) for index in range(count)]
     if count == 1:
         return DummyVecEnv([*makers])
-    if _FORK_SERVER in get_all_start_methods():
-        # The processes are forks of a server that has imported this module, once for all.
-        get_context(_FORK_SERVER).set_forkserver_preload([__name__])
+    # The processes are forks of a server that has imported this module, once for all.
+    start_fork_server([__name__])
     return SubprocVecEnv([*makers])
