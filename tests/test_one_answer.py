@@ -196,8 +196,10 @@ def test_all_doors_say_the_same(name: str, tmp_path: Path, monkeypatch: pytest.M
     unprotected, protected = found.unprotected_impulse_pa_s.value, found.impulse_pa_s.value
 
     _says_evaluate(asked, given, buildings, found)
-    _says_assess(asked, charge, levels, found)
-    _says_report(study, worst, buildings, levels)
+    likely = _says_assess(asked, charge, levels, found)
+    document = _says_report(study, worst, buildings, levels)
+    facts = next(part for part in document.parts if isinstance(part, Table))
+    assert any(cells[1].startswith(f"level {likely};") for cells in facts.cells())
     _says_page(asked, worst, buildings, consequences, levels)
     assert unprotected >= protected or found.mean_reduction < 0.0
 
@@ -229,15 +231,15 @@ def _says_evaluate(
     assert f"worst threat: {found.worst.charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f})" in whole
 
 
-def _says_assess(
-    asked: Asked, charge: Charge, levels: Mapping[str, str], found: Evaluation
-) -> None:
+def _says_assess(asked: Asked, charge: Charge, levels: Mapping[str, str], found: Evaluation) -> str:
+    """The level and the grid errors; return the probability of the level in words."""
     text = asked.command("assess", "--charges", "16")
+    likely = row_of(text, "probability, ", "barrier ").partition(": ")[2]
     for building, level in levels.items():
         rows = [line for line in text.splitlines() if building in line and "barrier " in line]
         assert any(level in row for row in rows), text
     if found.grid_error is None:
-        return
+        return likely
     share = found.grid_error
     sides = (
         Number(value.value, "Pa s", off * value.value).text()
@@ -251,18 +253,18 @@ def _says_assess(
     line = row_of(text, "impulse on the protected structures under the worst charge")
     assert line.endswith(f"{unprotected} without barrier, {protected} with, reduction {gone}")
     assert charge == share.threat.charge_against(asked.scenario)
+    return likely
 
 
 def _says_report(
     study: Study, worst: int, buildings: Mapping[str, tuple[str, ...]], levels: Mapping[str, str]
-) -> None:
+) -> Document:
     assert study.protected.worst_number == worst
     document = report_document(Report(study))
     for title, level in levels.items():
         name = study.scenario.title_of(title)
-        rows = rows_of(document, "Buildings with a facade")
-        at = next(k for k, row in enumerate(rows) if row[0] == name)
-        assert rows[at + 1][2] == level
+        rows = [row for row in rows_of(document, "worst of all charges") if name in row[1]]
+        assert rows[-1][2] == level
     heads = [part for part in document.parts if isinstance(part, Line) and part.kind == "head"]
     tables = [
         part.cells()
@@ -278,6 +280,7 @@ def _says_report(
         assert tables[worst][at][4] == unprotected
         assert tables[worst][at + 1][4] == protected
         assert tables[worst][at + 1][9].startswith(gone)
+    return document
 
 
 def _says_page(

@@ -73,7 +73,6 @@ def assessment(
         required: Further requirements.
     """
     scenario, judged = blasts.scenario, found[blasts.judged]
-    coarse = {} if blasts.coarse is None else consequences_by_layout(blasts.coarse)
     yield from _verdict(blasts, judged, target)
     judged_first = [*found.items()][::-1]
     for requirement in required:
@@ -88,8 +87,8 @@ def assessment(
         yield Line.of(f"probability, {name}: {likely.words(target)}")
     if error is not None:
         yield from impulse_lines(error)
-        yield from lines(_levels_changed(blasts, judged, coarse))
-    yield _buildings(blasts, found, coarse)
+        yield from lines(_levels_changed(blasts, judged))
+    yield response_table(blasts, found)
     for name, own in [*found.items()][:-1]:
         yield from lines((f"flag, {name}: {note}" for note in own.notes), "flag")
     yield from _neighbours(blasts, found)
@@ -143,15 +142,14 @@ def impulse_lines(error: GridError) -> Iterator[Line]:
     yield Line.of(cells_words(error), kind="quiet")
 
 
-def _levels_changed(
-    blasts: Blasts, judged: Consequences, coarse: Mapping[str, Consequences]
-) -> Iterator[str]:
+def _levels_changed(blasts: Blasts, judged: Consequences) -> Iterator[str]:
     """Yield levels that cells change under the worst charge."""
-    if blasts.coarse is None:
+    coarse = _on_coarser_cells(blasts, judged).get(blasts.judged)
+    if coarse is None or blasts.coarse is None:
         return
     for building in judged.buildings:
-        fine = judged.of(building)[_coarse_number(blasts)].facade.level_of_protection
-        other = coarse[blasts.judged].level(building)
+        fine = judged.of(building)[judged.worst_number].facade.level_of_protection
+        other = coarse.level(building)
         if other != fine:
             words = blasts.coarse.engine.words
             yield (
@@ -160,10 +158,12 @@ def _levels_changed(
             )
 
 
-def _coarse_number(blasts: Blasts) -> int:
-    """Return the number of the charge that has coarser cells as well."""
-    assert blasts.coarse is not None
-    return blasts.threats.index(blasts.coarse.threats[0])
+def _on_coarser_cells(blasts: Blasts, judged: Consequences) -> dict[str, Consequences]:
+    """Return the consequences of the governing charge on coarser cells; empty without these."""
+    governing = blasts.threats[judged.worst_number]
+    if blasts.coarse is None or governing not in blasts.coarse.threats:
+        return {}
+    return consequences_by_layout(blasts.coarse.under([blasts.coarse.threats.index(governing)]))
 
 
 def response_cells(
@@ -182,10 +182,10 @@ def response_cells(
     return whole.level, panes, whole.condition, whole.damage
 
 
-def _buildings(
-    blasts: Blasts, found: Mapping[str, Consequences], coarse: Mapping[str, Consequences]
-) -> Table:
-    number = 0 if blasts.coarse is None else _coarse_number(blasts)
+def response_table(blasts: Blasts, found: Mapping[str, Consequences]) -> Table:
+    """Return the table of buildings with a facade, by layout: the worst of all charges."""
+    judged = found[blasts.judged]
+    number, coarse = judged.worst_number, _on_coarser_cells(blasts, judged)
     rows = [
         (
             name,

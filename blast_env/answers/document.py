@@ -8,9 +8,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, isnan, log10, nan
-from typing import TYPE_CHECKING, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
-
-from pydantic import ConfigDict
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
@@ -63,8 +61,6 @@ class Number:
         sampled: What was sampled for that; with it, each error has its name beside it.
         flag: Words after it.
     """
-
-    __pydantic_config__: ClassVar = ConfigDict(ser_json_inf_nan="constants")
 
     value: float
     unit: str = ""

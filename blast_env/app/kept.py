@@ -18,7 +18,13 @@ MOST_BYTES: Final = 50_000_000
 class StoredRecord(BaseModel):
     """Base of the records in files: frozen; missing numbers are NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        ser_json_inf_nan="constants",
+        ser_json_bytes="base64",
+        val_json_bytes="base64",
+    )
 
 
 AnyKept = TypeVar("AnyKept", bound=StoredRecord)

@@ -22,11 +22,11 @@ from blast_env.evaluation.engines.contract import BlastDrawing
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.places import chief_threats, other_places, requested_threats
-from blast_env.evaluation.questions.grid_error import Effect, impulse_of
+from blast_env.evaluation.questions.grid_error import Effect, GridError, impulse_of
 from blast_env.evaluation.questions.limits import Limit, LimitedLoad, SiteVerdict, check_limits
 from blast_env.evaluation.questions.probability import Uncertainty
 from blast_env.evaluation.questions.reduction import ThreatOutcome
-from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.evaluation.questions.verdict import Consequences, consequences_by_layout
 from blast_env.evaluation.record import BlastRecord
 from blast_env.evaluation.store import BlastStore
 from blast_env.gas.cost import CostGuess, cost_words
@@ -349,19 +349,19 @@ class Study:
         return next(level for level in asked if level is not None)
 
     @cached_property
+    def found(self) -> dict[str, Consequences]:
+        """Response of the buildings and of the barrier without the layout and with it, by name."""
+        return consequences_by_layout(self.blasts)
+
+    @property
     def unprotected(self) -> Consequences:
-        """Response of the buildings without the layout."""
-        return consequences_of(self.blasts, NO_BARRIER)
+        """That without the layout."""
+        return self.found[NO_BARRIER]
 
-    @cached_property
+    @property
     def protected(self) -> Consequences:
-        """Response of the buildings and of the barrier with it."""
-        return consequences_of(self.blasts)
-
-    @cached_property
-    def coarse(self) -> Consequences:
-        """The same with the coarser cells."""
-        return consequences_of(self.blasts.coarse or self.blasts)
+        """That with it."""
+        return self.found[self.blasts.judged]
 
     def buildings(self, *, protected: bool) -> tuple[str, ...]:
         """Return the buildings with a known load, those that count or the others."""
@@ -392,7 +392,7 @@ class Study:
     @property
     def verdicts(self) -> tuple[SiteVerdict, SiteVerdict]:
         """The verdicts without the layout and with it."""
-        sides = zip((self.unprotected, self.protected), self.blasts.records.values(), strict=True)
+        sides = zip(self.found.values(), self.blasts.records.values(), strict=True)
         without, behind = (
             SiteVerdict(found, self.target, tuple(self._limited(records)))
             for found, records in sides
@@ -420,11 +420,9 @@ class Study:
 
     @property
     def uncertainty(self) -> Uncertainty:
-        """The uncertain quantities, with the largest grid error of an impulse with the layout."""
-        every = (effect for own in self.effects.values() for effect in own)
-        shares = (effect.error / effect.value for effect in every if effect.value > 0.0)
-        cells = max((share for share in shares if np.isfinite(share)), default=0.0)
-        return Uncertainty(mass=self.options.mass_error, cells=cells)
+        """The uncertain quantities, with the grid error under the threat that governs."""
+        number = self.protected.worst_number if self.protected.responses else self.blasts.worst()
+        return Uncertainty.of(self.options.mass_error, GridError.of(self.blasts, number=number))
 
     @property
     def grid_error(self) -> float:

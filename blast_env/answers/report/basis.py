@@ -18,7 +18,7 @@ from blast_env.evaluation.engines.peaks import PeakSource
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.grid_error import FACTOR, ORDER
 from blast_env.evaluation.questions.limits import LimitedLoad, SiteVerdict
-from blast_env.evaluation.questions.verdict import Verdict, other_glazing
+from blast_env.evaluation.questions.verdict import Verdict, consequences_of, other_glazing
 from blast_env.evaluation.record import BuildingLoad
 from blast_env.evaluation.study import Study, gas_of
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -210,7 +210,7 @@ def _grid_error(study: Study) -> str:
         f"both sizes: {formula}): smaller differences are not significant"
     )
     if study.protected.buildings:
-        found = study.coarse
+        found = consequences_of(coarse)
         levels = (
             f"{study.scenario.title_of(name)} {found.level_words(name)}" for name in found.buildings
         )
@@ -303,11 +303,6 @@ def _counted(load: BuildingLoad) -> AnyCell:
 def _validity(study: Study) -> Iterator[AnyPart]:
     yield Line.of("Validity", kind="head")
     yield from lines(_VALIDITY, "item")
-    small = "Walls of realistic height often reduce the impulse by only a few per cent, about the "
-    known = f" Here the {grid_error_words(study)}." if study.blasts.coarse is not None else ""
-    yield Line.of(f"{small}size of these errors.{known}", kind="item")
-    words = "The report covers the threats of the table above; others can be worse."
-    yield Line.of(words, kind="item")
     notes = [note for blasts in study.sizes for note in study.notes_of(blasts)]
     if not notes:
         yield Line.of("No load in this report is outside that range.")
@@ -326,6 +321,9 @@ _VALIDITY: Final = (
     "m/kg^(1/3) against Kingery and Bulmash's curves. Impulses on a wall that faces the charge "
     "agree within several per cent; peaks are too low, the more so the coarser the cells; places "
     "right behind an edge are the least certain (docs/engineers/gas.md has the figures).",
+    "Walls of realistic height often reduce the impulse by only a few per cent, about the size of "
+    "these errors.",
+    "The report covers the threats of the table above; others can be worse.",
 )
 
 

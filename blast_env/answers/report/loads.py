@@ -39,11 +39,6 @@ def _meaning(study: Study) -> Iterator[AnyPart]:
         "wall is the mean over that wall; the duration is that of the first positive phase of its "
         "mean overpressure."
     )
-    if study.blasts.coarse is not None:
-        yield Line.of(
-            "Beside impulses and reductions stands the grid error; that of reductions in "
-            "percentage points."
-        )
     fine = gas_of(study.blasts).cell_words
     words = f"Peaks grow with finer cells: take those with {fine} as a lower bound."
     yield Line.of(words, kind="flag")

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
+from blast_env.answers.assess import response_table
 from blast_env.answers.document import AnyPart, Line, Number, Section, Table, percent
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.capacity import mass_near
 from blast_env.evaluation.questions.probability import level_probability, probability_text
-from blast_env.evaluation.questions.verdict import BuildingSummary
 from blast_env.evaluation.study import Study, gas_of
 from blast_env.geometry import layout_counts
 from blast_env.layout import LayoutState
@@ -55,7 +55,7 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
     if behind.doubt:
         yield Line.of(f"Cells clip peaks: {behind.doubt}.")
     if behind.found.buildings:
-        yield _buildings(study)
+        yield response_table(study.blasts, study.found)
         yield Line.of(f"With the layout: {study.protected.force_words}.", kind="quiet")
     if behind.limited:
         kept, of_bare = (sum(load.is_kept for load in side.limited) for side in (behind, bare))
@@ -110,8 +110,8 @@ def _reasons(study: Study) -> Iterator[str]:
         bare, own = study.unprotected.summary(name), behind.summary(name)
         yield (
             f"{title_of(name)} has the level {own.level}; without the layout: {bare.level}. With it"
-            f" {_panes(own).text()} panes break; worst pane {own.condition}, worst panel"
-            f" {own.damage}."
+            f" {own.broken:.1f} of {own.panes} panes break and {own.failed} of {own.panels} panels"
+            f" fail; worst pane {own.condition}, worst panel {own.damage}."
         )
     for name, effects in [*study.effects.items()][:1]:
         least, most = (
@@ -145,27 +145,6 @@ def _basis(study: Study) -> Iterator[str]:
         title = study.scenario.title_of(name)
         yield f"Validation of the load that decides on {title}: {words}."
     yield "Components and costs of the site file; frames and anchors hold."
-
-
-def _panes(own: BuildingSummary) -> Number:
-    return Number(own.broken, digits=1, flag=f" of {own.panes}")
-
-
-def _buildings(study: Study) -> Table:
-    headers = (
-        *("building", "", "level of protection", "worst pane (GSA, ISO)", "worst panel"),
-        *("panes that break", "panels that fail"),
-    )
-    rows = []
-    for name in study.protected.buildings:
-        sides = study.unprotected.summary(name), study.protected.summary(name)
-        for words, own in zip(("without", "with"), sides, strict=True):
-            title = study.scenario.title_of(name) if words == "without" else ""
-            failed = f"{own.failed} of {own.panels}"
-            texts = title, words, own.level, own.condition, own.damage
-            rows.append((*texts, _panes(own), failed))
-    title = "Buildings with a facade, worst of the threats"
-    return Table.of(title, headers, rows, 5, main=range(1, len(rows), 2))
 
 
 def _loads(study: Study) -> Iterator[AnyPart]:
