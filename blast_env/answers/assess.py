@@ -196,7 +196,7 @@ def response_table(blasts: Blasts, found: Mapping[str, Consequences]) -> Table:
         for building in own.buildings
     ]
     title = f"{blasts.scenario.name}: the worst of all charges"
-    return Table.of(title, ("layout", *RESPONSE_HEADERS), rows, 3)
+    return Table.of(title, ("layout", *RESPONSE_HEADERS), rows, 3, 2)
 
 
 def _neighbours(blasts: Blasts, found: Mapping[str, Consequences]) -> Iterator[AnyPart]:
@@ -240,7 +240,7 @@ def _glazing(scenario: Scenario, judged: Consequences, target: LevelOfProtection
             words = building_words(scenario, building)
             rows.append((name, words, *response_cells(other, building), passes.lower()))
     headers = ("glass in all windows", *RESPONSE_HEADERS, "verdict")
-    return Table.of("the same loads, other glass", headers, rows, 3)
+    return Table.of("the same loads, other glass", headers, rows, 3, 3)
 
 
 def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Iterator[AnyPart]:

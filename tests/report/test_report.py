@@ -295,6 +295,9 @@ def test_pdf_has_the_same_pages_of_text_and_pictures(report: Report, tmp_path: P
     document = pypdfium2.PdfDocument(pdf)
     text = "".join(sheet.get_textpage().get_text_range() for sheet in document)
     assert "Contribution of each item" in text
+    first = document[0].get_textpage().get_text_range()
+    assert report.study.verdicts[1].word in first  # also where the summary is long
+    assert "Loads of the protected buildings" in first
     assert small_hut().content_hash[:20] in text
     assert f"{len(document)} / {len(document)}" in text
     pictures = sum(1 for sheet in document for item in sheet.get_objects() if item.type == 3)
