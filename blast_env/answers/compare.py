@@ -198,17 +198,19 @@ def verdict_table(
         judged: Name of the layout and of the threat, and the responses.
     """
     found: dict[tuple[str, str], list[tuple[str, BuildingVerdict]]] = {}
-    for name, threat, responses in judged:
-        for response in responses:
-            found.setdefault((name, response.building), []).append((threat, response))
+    for name, threat, verdicts in judged:
+        for verdict in verdicts:
+            found.setdefault((name, verdict.building), []).append((threat, verdict))
     rows = []
     for (name, building), own in found.items():
         title = scenario.title_of(building)
         if len(own) > 1:
-            worst = max((other for _, other in own), key=lambda each: each.severity)
-            every = dict.fromkeys(flag for _, each in own for flag in each.flags)
+            worst = max((verdict for _, verdict in own), key=lambda verdict: verdict.severity)
+            every = dict.fromkeys(flag for _, verdict in own for flag in verdict.flags)
             rows.append(_verdict_row(worst, name, f"worst of {len(own)}", title, every))
-        rows += [_verdict_row(part, name, threat, title, part.flags) for threat, part in own]
+        rows += [
+            _verdict_row(verdict, name, threat, title, verdict.flags) for threat, verdict in own
+        ]
     return Table.of("", _BUILDINGS, rows, len(_BUILDINGS))
 
 

@@ -280,7 +280,7 @@ class _Component:
         facade, own_pa = self.response.on_cells, self.response.on_cells.pressure_pa[self.index]
         pushed_pa = pushes(facade.time_s, own_pa[np.newaxis])[0]
         factors = {max(self.response.peak_factor, 1.0), 1.0}
-        return [(own, factor) for own in (pushed_pa, own_pa) for factor in factors]
+        return [(history_pa, factor) for history_pa in (pushed_pa, own_pa) for factor in factors]
 
 
 def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Component]:
@@ -294,11 +294,11 @@ def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Co
         for is_window, (rows, damage) in zip((True, False), parts, strict=True):
             for index, number in zip(rows.astype(int).tolist(), damage.tolist(), strict=True):
                 loads = float(peaks_pa[index]), float(impulses_pa_s[index])
-                each = _Component(response, index, is_window, number, *loads)
-                kinds.setdefault(each.kind, []).append(each)
+                component = _Component(response, index, is_window, number, *loads)
+                kinds.setdefault(component.kind, []).append(component)
     for own in kinds.values():
         kept: dict[int, _Component] = {}
         for name in ("damage", "peak_pa", "impulse_pa_s"):
-            for part in sorted(own, key=lambda one: -float(getattr(one, name)))[:count]:
-                kept[id(part)] = part
+            largest = sorted(own, key=lambda component: -float(getattr(component, name)))
+            kept |= {id(component): component for component in largest[:count]}
         yield from kept.values()

@@ -368,18 +368,18 @@ class Consequences:
         found = [own.facade for own in self.of(building)]
         walled = len(found[0].walled)
         hazardous = [
-            [level >= DamageLevel.HAZARDOUS for level in one.walls.levels] for one in found
+            [level >= DamageLevel.HAZARDOUS for level in facade.walls.levels] for facade in found
         ]
         return BuildingSummary(
             level=self.level_words(building),
-            broken=max(part.broken_panes for part in found),
+            broken=max(facade.broken_panes for facade in found),
             panes=found[0].panes,
-            condition=max(other.worst_condition for other in found).words
+            condition=max(facade.worst_condition for facade in found).words
             if found[0].panes
             else _NONE,
             failed=max(map(sum, hazardous)),
             panels=walled,
-            damage=max(each.worst_damage for each in found).name.lower() if walled else _NONE,
+            damage=max(facade.worst_damage for facade in found).name.lower() if walled else _NONE,
         )
 
     def worst_damage(self, scenario: Scenario) -> float:
