@@ -1,7 +1,7 @@
 """The answer of `advise`: the cost to pass, flags, errors, and the table of kinds of measures."""
 
 from collections.abc import Iterator
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from blast_env.answers.assess import impulse_lines
 from blast_env.answers.document import AnyPart, Line, Table, lines, percent
@@ -12,6 +12,9 @@ from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import layout_words
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _HEADERS: Final = (
     *("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks"),
@@ -87,3 +90,26 @@ def _first_line(found: AdviceResult, best: Advice) -> str:
             f"{percent(gain)}. {answer}"
         )
     return answer
+
+
+def advice_figure(advice: AdviceResult) -> "Figure":
+    """Return the figure of cost against level of protection, of all layouts tried and judged."""
+    # Here, because pictures need the extra `render`.
+    from blast_env.plots.cost_level import PricedDamage, cost_level_figure
+
+    judge, scenario = advice.judge, advice.judge.scenario
+    tried = {
+        str(own.kind): [PricedDamage(x.cost, x.damage) for x in own.tried] for own in advice.found
+    }
+    searched = {
+        x.layout: PricedDamage(x.cost, x.damage) for part in advice.found for x in part.tried
+    }
+    pairs = [
+        (searched[layout], searched[layout]._replace(damage=seen.worst_damage(scenario)))
+        for layout, seen in judge.judged.items()
+    ]
+    count = len(judge.problem.threats)
+    title = f"{scenario.name}: cost of each higher level, worst of {count} charges"
+    engines = judge.problem.evaluator.engine.words, judge.engine.words
+    axis = f"cost, {scenario.zone.cost_unit}" if scenario.zone.currency else "cost units"
+    return cost_level_figure(tried, pairs, judge.target, title, engines, axis)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import nan
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from blast_env.evaluation.questions.grid_error import (
 )
 from blast_env.evaluation.questions.probability import Uncertainty, level_probability
 from blast_env.evaluation.questions.verdict import (
+    BuildingResponse,
     Consequences,
     Verdict,
     consequences_by_layout,
@@ -41,6 +42,9 @@ from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
 from blast_env.values import count_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RESPONSE_HEADERS: Final = (
     *("building", "level of protection", "panes broken", "worst pane (GSA, ISO)", "worst panel"),
@@ -240,7 +244,7 @@ def _glazing(scenario: Scenario, judged: Consequences, target: LevelOfProtection
             words = building_words(scenario, building)
             rows.append((name, words, *response_cells(other, building), passes.lower()))
     headers = ("glass in all windows", *RESPONSE_HEADERS, "verdict")
-    return Table.of("the same loads, other glass", headers, rows, 3, 3)
+    return Table.of("the same loads, other glass", headers, rows, 3)
 
 
 def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Iterator[AnyPart]:
@@ -274,3 +278,29 @@ def _stand_off_text(edge: Edge) -> str:
     """Return the stand-off in m, with the sign of a bound at an end of the ladder."""
     sign = ("<= " if edge.is_kept else "> ") if edge.is_end else ""
     return f"{sign}{edge.stand_off_m:.1f}"
+
+
+def facade_figure(scenario: Scenario, found: Mapping[str, Consequences]) -> "Figure":
+    """Return the facade that decides under the worst charge, with each layout."""
+    from blast_env.plots.facade import facade_picture  # pictures need the extra `render`
+
+    return facade_picture(*_deciding_facade(scenario, found))
+
+
+def pressure_impulse_figure(scenario: Scenario, found: Mapping[str, Consequences]) -> "Figure":
+    """Return the pressure-impulse diagram of that facade."""
+    from blast_env.plots.pressure_impulse import pressure_impulse_diagram
+
+    rows, title = _deciding_facade(scenario, found)
+    return pressure_impulse_diagram([(name, own.facade) for name, own in rows], title)
+
+
+def _deciding_facade(
+    scenario: Scenario, found: Mapping[str, Consequences]
+) -> tuple[list[tuple[str, BuildingResponse]], str]:
+    """Return the response of the building that decides, by layout, and its title."""
+    *_, judged = found.values()
+    worst = max(judged.responses, key=lambda response: response.severity)
+    number = judged.responses.index(worst)
+    title = f"{scenario.title_of(worst.building)}: {charge_text(worst.charge)}, the worst"
+    return [(name, own.responses[number]) for name, own in found.items()], title

@@ -1,7 +1,7 @@
 """The answer of `evaluate`: mean loads of buildings and the effect of a layout over all threats."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from blast_env.answers.assess import cells_words
 from blast_env.answers.document import (
@@ -20,6 +20,9 @@ from blast_env.evaluation.questions.reduction import Evaluation
 from blast_env.geometry import layout_counts
 from blast_env.site import ObjectiveSection
 from blast_env.statistics import Estimate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _HEADERS: Final = (
     *("building", "protected", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
@@ -62,15 +65,19 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     yield from lines((f"note: {note}" for note in found.notes), "flag")
 
 
-def evaluation_title(found: Evaluation) -> str:
-    """Return the title of the figure of an evaluation: the reduction and its errors."""
+def evaluation_picture(found: Evaluation) -> "Figure":
+    """Return the figure of an evaluation, with its reduction and errors as title."""
+    # Here, because pictures need the extra `render`.
+    from blast_env.plots.evaluation_figures import evaluation_figure
+
     barrier = layout_counts(found.layout, "barrier") if found.layout else "no barrier"
     share = Number.share(found.mean_reduction, found.reduction_error)
     own = f" (95 %: {interval(found.reduction)})" if len(found.threats) > 1 else ""
     noun = found.scenario.objective.noun
-    return (
+    title = (
         f"{found.scenario.name}, {barrier}: reduction of the {noun} {share.text(TYPOGRAPHIC)}{own}"
     )
+    return evaluation_figure(found, title)
 
 
 def _threats_text(count: int, seeds: Sequence[int]) -> str:

@@ -3,11 +3,10 @@
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
-from blast_env.answers.advise import advice_answer
+from blast_env.answers.advise import advice_answer, advice_figure
 from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
@@ -32,7 +31,6 @@ from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import (
     ROUNDS,
     AdviceJudge,
-    AdviceResult,
     advised,
     site_with_target,
 )
@@ -43,9 +41,6 @@ from blast_env.layout import write_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import load_scenario
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def advise(
@@ -116,26 +111,4 @@ def advise(
     if out is not None:
         made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
         print_written([write_layout(out, site, found.best.layout, made)])
-    print_written(save_figures((picture, partial(_draw, found))))
-
-
-def _draw(advice: AdviceResult) -> "Figure":
-    # Here, because pictures need the extra `render`.
-    from blast_env.plots.cost_level import PricedDamage, cost_level_figure
-
-    judge, scenario = advice.judge, advice.judge.scenario
-    tried = {
-        str(own.kind): [PricedDamage(x.cost, x.damage) for x in own.tried] for own in advice.found
-    }
-    searched = {
-        x.layout: PricedDamage(x.cost, x.damage) for part in advice.found for x in part.tried
-    }
-    pairs = [
-        (searched[layout], searched[layout]._replace(damage=seen.worst_damage(scenario)))
-        for layout, seen in judge.judged.items()
-    ]
-    count = len(judge.problem.threats)
-    title = f"{scenario.name}: cost of each higher level, worst of {count} charges"
-    engines = judge.problem.evaluator.engine.words, judge.engine.words
-    axis = f"cost, {scenario.zone.cost_unit}" if scenario.zone.currency else "cost units"
-    return cost_level_figure(tried, pairs, judge.target, title, engines, axis)
+    print_written(save_figures((picture, partial(advice_figure, found))))

@@ -2,13 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.answers.assess import assessment, capacity_answer, governing
-from blast_env.answers.document import charge_text
+from blast_env.answers.assess import (
+    assessment,
+    capacity_answer,
+    facade_figure,
+    governing,
+    pressure_impulse_figure,
+)
 from blast_env.answers.screening import screening_answer
 from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import PICTURES, writes
@@ -174,7 +180,9 @@ def assess(
         print_parts(assessment(blasts, found, level, mass_error, required))
     if table is not None:
         print_written([write_csv(bay_table(found), table)])
-    _draw(site, found, picture, diagram)
+    drawings = (picture, facade_figure), (diagram, pressure_impulse_figure)
+    figures = ((path, partial(draw, site, found)) for path, draw in drawings)
+    print_written(save_figures(*figures))
 
 
 def _capacity(
@@ -188,32 +196,6 @@ def _capacity(
     with progress_bar(f"{site.name}: masses and stand-offs") as progress:
         found = capacity_of(evaluator, layouts, charges, progress)
     print_parts(capacity_answer(site, found))
-
-
-def _draw(
-    scenario: Scenario,
-    found: Mapping[str, Consequences],
-    picture: Path | None,
-    diagram: Path | None,
-) -> None:
-    """Draw the facades and the pressure-impulse diagram under the worst charge."""
-    *_, judged = found.values()
-    worst = max(judged.responses, key=lambda response: response.severity)
-    number = judged.responses.index(worst)
-    rows = [(name, own.responses[number]) for name, own in found.items()]
-    title = f"{scenario.title_of(worst.building)}: {charge_text(worst.charge)}, the worst"
-
-    def facades() -> "Figure":
-        from blast_env.plots.facade import facade_picture
-
-        return facade_picture(rows, title)
-
-    def pressure_impulse() -> "Figure":
-        from blast_env.plots.pressure_impulse import pressure_impulse_diagram
-
-        return pressure_impulse_diagram([(name, own.facade) for name, own in rows], title)
-
-    print_written(save_figures((picture, facades), (diagram, pressure_impulse)))
 
 
 def _screen(

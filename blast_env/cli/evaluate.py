@@ -4,12 +4,12 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import typer
 
 from blast_env.answers.document import percent
-from blast_env.answers.evaluate import evaluation_answer, evaluation_title
+from blast_env.answers.evaluate import evaluation_answer, evaluation_picture
 from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import Target, note_target, writes
 from blast_env.cli.options import (
@@ -46,9 +46,6 @@ from blast_env.layout import LayoutFile, load_layout
 from blast_env.site import load_scenario
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level
 from blast_env.tables import write_csv
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _note_export(context: typer.Context, value: Path | None) -> Path | None:
@@ -159,14 +156,7 @@ def _write(found: Evaluation, record: Mapping[str, Any], out: Path) -> list[Path
         write_text(out / "evaluation.json", text + "\n"),
         *(write_csv(table, out / name) for name, table in tables.items()),
         *save_pictures(
-            (out / "evaluation.png", partial(_figure, found)),
+            (out / "evaluation.png", partial(evaluation_picture, found)),
             (out / LAYOUT_PICTURE, partial(layout_picture, found.scenario, found.layout)),
         ),
     ]
-
-
-def _figure(found: Evaluation) -> "Figure":
-    # Here, because pictures need the extra `render`.
-    from blast_env.plots.evaluation_figures import evaluation_figure
-
-    return evaluation_figure(found, evaluation_title(found))

@@ -8,10 +8,10 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
-from blast_env.answers.evaluate import evaluation_title
+from blast_env.answers.evaluate import evaluation_picture
 from blast_env.evaluation import Evaluation, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.plots import evaluation_figure, save_figure
+from blast_env.plots import save_figure
 from blast_env.site import Scenario
 from tests.gas_sites import WALL as WALL_OF_HUT
 from tests.gas_sites import hut
@@ -33,7 +33,7 @@ def evaluation() -> Evaluation:
 
 @pytest.fixture(scope="module")
 def figure(evaluation: Evaluation) -> Figure:
-    return evaluation_figure(evaluation, evaluation_title(evaluation))
+    return evaluation_picture(evaluation)
 
 
 def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
@@ -99,7 +99,7 @@ def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> Non
     evaluation = evaluate_layout(
         load_scenario("courtyard"), [], engine="event", threats=THREATS[:1]
     )
-    figure = evaluation_figure(evaluation, evaluation_title(evaluation))
+    figure = evaluation_picture(evaluation)
     assert "no barrier: reduction of the impulse 0.0 %" in figure.get_suptitle()
     assert "95 %" not in figure.get_suptitle()
     path = save_figure(figure, tmp_path / "empty.png")
@@ -116,7 +116,7 @@ def test_the_parts_of_a_building_have_one_load() -> None:
     scenario = Scenario.from_document(document, "halves")
     engine = GasEngine(border_m=0.0, until=0.01)
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
-    figure = evaluation_figure(found, evaluation_title(found))
+    figure = evaluation_picture(found)
     assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
     words = [each.get_text() for axes in figure.axes for each in axes.texts]
     assert not any("calibration" in each for each in words)
