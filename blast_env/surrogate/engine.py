@@ -17,7 +17,8 @@ from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
 from blast_env.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_env.surrogate.walls import Memory, SurrogateSite, site_of
+from blast_env.surrogate.pieces import Memory
+from blast_env.surrogate.walls import SurrogateSite, site_of
 
 SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""

@@ -4,16 +4,16 @@ Each solid sends a message to each point, computed from their relations. The pre
 is a function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import chain, zip_longest
+from itertools import zip_longest
 from math import prod
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -24,8 +24,11 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.response.damage import BayDamage
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.layers import SingleArray, active_layer, last_layer, padded, runs
+from blast_env.surrogate.pieces import Box, KnownPieces, Numbers
 from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
+from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SurrogateSite
+from blast_env.surrogate.ways import SHARES
 
 IntArray = NDArray[np.int64]
 AnyFloats = NDArray[np.floating[Any]]
@@ -42,9 +45,6 @@ IMPULSE_POWER: Final = 1.0
 
 PEAK_POWER: Final = 16.0
 """Exponent of the power mean over the walls for peaks: close to the maximum."""
-
-_AT_ONCE: Final = 64
-"""Rows that pass through all layers together: so few fit into a processor's cache."""
 
 _MOST_SPREADS: Final = 4.0
 """Bound on the distance of inputs from their mean, in units of their scale."""
@@ -210,7 +210,7 @@ class Networks:
             for arrays, shape in zip_longest(zip(*members, strict=True), SHAPES)
         ]
         single = [each.astype(np.float32) for each in stacked]
-        self._layers = Member(*(each[:, np.newaxis] if each.ndim == 2 else each for each in single))
+        self._layers = Member(*single)
 
     def messages(self, scaled: FloatArray) -> SingleArray:
         """Return the message of each solid to each point (members, solids x points, MESSAGE).
@@ -219,12 +219,13 @@ class Networks:
             scaled: Their relations, less the mean, over the scale (solids x points, RELATIONS).
         """
         layers = self._layers
-        found = np.empty((len(self.members), len(scaled), MESSAGE), dtype=np.float32)
-        given = scaled.astype(np.float32)
-        for few in _runs(len(scaled)):
-            sent = _silu(_product(given[np.newaxis, few], layers.send) + layers.send_bias)
-            found[:, few] = _silu(_product(sent, layers.message) + layers.message_bias)
-        return found
+        found = np.empty((len(self.members), padded(len(scaled)), MESSAGE), dtype=np.float32)
+        given = np.zeros((1, found.shape[1], scaled.shape[1]), dtype=np.float32)
+        given[0, : len(scaled)] = scaled
+        for few in runs(found.shape[1]):
+            sent = active_layer(given, layers.send, layers.send_bias, few)
+            found[:, few] = active_layer(sent, layers.message, layers.message_bias)
+        return found[:, : len(scaled)]
 
     def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
         """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
@@ -236,71 +237,25 @@ class Networks:
         Returns:
             (members, points).
         """
+        members, points, _ = heard.shape
+        both = np.zeros((members, padded(points), FEATURES + MESSAGE), dtype=np.float32)
+        both[:, :points, :FEATURES] = scaled
+        both[:, :points, FEATURES:] = heard
+        return self.differs(both)[:, :points]
+
+    def differs(self, both: SingleArray) -> FloatArray:
+        """Return the same (members, rows) from a padded number of rows of inputs.
+
+        Args:
+            both: Scaled features and the sum of messages (members, rows, FEATURES + MESSAGE).
+        """
         layers = self._layers
-        differs = np.empty((len(self.members), len(scaled)))
-        given = scaled.astype(np.float32)
-        for few in _runs(len(scaled)):
-            both = np.concatenate(
-                (
-                    np.broadcast_to(given[few], (len(self.members), *given[few].shape)),
-                    heard[:, few],
-                ),
-                axis=2,
-            )
-            first = _silu(_product(both, layers.first) + layers.first_bias)
-            second = _silu(_product(first, layers.second) + layers.second_bias)
-            differs[:, few] = (_product(second, layers.last) + layers.last_bias)[..., 0]
-        return differs
-
-
-def _runs(count: int) -> list[slice]:
-    """Return the slices of rows that pass through all layers together."""
-    return [slice(start, start + _AT_ONCE) for start in range(0, count, _AT_ONCE)]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _product(rows: SingleArray, weights: SingleArray) -> SingleArray:
-    """Return the matrix product of each member (members, rows, outputs).
-
-    A row has the same result whichever rows are beside it, so that a batch is one layout after the
-    other to the last bit. The kernels of BLAS differ between the middle and the end of a matrix,
-    on some processors.
-
-    Args:
-        rows: Rows of each member, or of all (members or 1, rows, inputs).
-        weights: Weights of each member (members, inputs, outputs).
-    """
-    members, inputs, outputs = weights.shape
-    found = np.zeros((members, rows.shape[1], outputs), dtype=np.float32)
-    whole = inputs - inputs % 4
-    for member in range(members):
-        of_member = weights[member]
-        for row in range(rows.shape[1]):
-            given = rows[member if len(rows) > 1 else 0, row]
-            if outputs == 1:  # the same sum, without a loop over outputs
-                single = np.float32(0.0)
-                for each in range(0, whole, 4):
-                    single += (
-                        given[each] * of_member[each, 0] + given[each + 1] * of_member[each + 1, 0]
-                    ) + (
-                        given[each + 2] * of_member[each + 2, 0]
-                        + given[each + 3] * of_member[each + 3, 0]
-                    )
-                for each in range(whole, inputs):
-                    single += given[each] * of_member[each, 0]
-                found[member, row, 0] = single
-                continue
-            total = found[member, row]
-            for each in range(0, whole, 4):  # four at once: the sums stay in registers
-                a, b, c, d = given[each], given[each + 1], given[each + 2], given[each + 3]
-                for output in range(outputs):
-                    total[output] += (
-                        a * of_member[each, output] + b * of_member[each + 1, output]
-                    ) + (c * of_member[each + 2, output] + d * of_member[each + 3, output])
-            for each in range(whole, inputs):
-                for output in range(outputs):
-                    total[output] += given[each] * of_member[each, output]
-    return found
+        found = np.empty(both.shape[:2])
+        for few in runs(both.shape[1]):
+            first = active_layer(both, layers.first, layers.first_bias, few)
+            second = active_layer(first, layers.second, layers.second_bias)
+            found[:, few] = last_layer(second, layers.last, layers.last_bias)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,27 +297,33 @@ class Surrogate:
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
-        pairs = [
-            (site.approach(charge), site.barrier(layout))
-            for layout, charge in zip(layouts, charges, strict=True)
+        of_charges: dict[Charge, list[int]] = {}
+        for number, charge in enumerate(charges):
+            of_charges.setdefault(charge, []).append(number)
+        groups = [
+            (site.approach(charge), [site.boxes(layouts[number]) for number in numbers])
+            for charge, numbers in of_charges.items()
         ]
-        scaled = self.scaled(np.concatenate([each.features(barrier) for each, barrier in pairs]))
-        area_m2 = np.concatenate([each.area_m2 for each, _ in pairs])
-        before = np.cumsum([0, *(len(each.area_m2) for each, _ in pairs[:-1])])
-        starts = np.concatenate(
-            [first + each.starts for first, (each, _) in zip(before, pairs, strict=True)]
-        )
+        met = [(approach, *self._met(site, approach, boxes)) for approach, boxes in groups]
+        place = np.empty(len(layouts), dtype=np.int64)
+        place[[number for numbers in of_charges.values() for number in numbers]] = range(len(place))
+        area_m2 = np.concatenate([np.tile(each.area_m2, len(own)) for each, _, own in met])
+        starts = self._starts(met)
 
-        def of(networks: Networks, known: Sequence[FloatArray], power: float) -> list[FloatArray]:
-            heard = self._heard(networks, pairs, site)
-            differs = networks(scaled, np.concatenate(heard, axis=1))
-            logs = log_loads(differs, np.concatenate(known), area_m2, starts, power)
-            return [each.reshape(len(pairs), -1) for each in _mean_and_spread(logs)]
+        def of(which: int, known: Callable[[Approach], FloatArray]) -> list[FloatArray]:
+            networks, power = self._of_loads[which]
+            differs = [_differs(networks, *of_group, which) for _, *of_group in met]
+            logs = [np.tile(known(each), len(own)) for each, _, own in met]
+            loads = log_loads(
+                np.concatenate(differs, axis=1), np.concatenate(logs), area_m2, starts, power
+            )
+            both = _mean_and_spread(loads)
+            return [each.reshape(len(layouts), -1)[place] for each in both]
 
-        impulse = of(self.impulse, [each.log_impulse for each, _ in pairs], IMPULSE_POWER)
+        impulse = of(0, attrgetter("log_impulse"))
         if not site.counts_peaks:
             return Guess(*impulse)
-        return Guess(*impulse, *of(self.peak, [each.log_peak for each, _ in pairs], PEAK_POWER))
+        return Guess(*impulse, *of(1, attrgetter("log_peak")))
 
     def upper_ends(self, guess: Guess, which: BoolArray | bool = True) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
@@ -409,42 +370,46 @@ class Surrogate:
             temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
         return path
 
-    def _heard(
-        self,
-        networks: Networks,
-        pairs: Sequence[tuple[Approach, FloatArray]],
-        site: SurrogateSite,
-    ) -> list[SingleArray]:
-        """Return the sum of messages to each point of each pair (members, points, MESSAGE).
+    @property
+    def _of_loads(self) -> tuple[tuple[Networks, float], ...]:
+        """The networks of impulses and of peaks, with the powers of their means over walls."""
+        return (self.impulse, IMPULSE_POWER), (self.peak, PEAK_POWER)
 
-        Layouts have many pieces in common, so the messages of each piece are cached.
-        """
-        of_pairs = [
-            [_Sender(networks, each), *(_Sender(networks, each, tuple(row)) for row in barrier)]
-            for each, barrier in ((each, barrier.tolist()) for each, barrier in pairs)
-        ]
-        known = site.memory.of_all(chain.from_iterable(of_pairs), self._sent)
-        return [_sum([known[each] for each in senders]) for senders in of_pairs]
+    def _met(
+        self, site: SurrogateSite, approach: Approach, layouts: Sequence[Sequence[Box]]
+    ) -> tuple[KnownPieces, Numbers]:
+        """Return what is known of the pieces of layouts under one charge, and their numbers."""
+        kinds = self._of_loads if site.counts_peaks else self._of_loads[:1]
 
-    def _sent(self, senders: Sequence["_Sender"]) -> list[SingleArray]:
-        """Return the sum of the messages to each point (members, points, MESSAGE)."""
-        of_approaches: dict[Approach, list[int]] = {}
-        related = [each.approach.solids for each in senders]
-        for number, each in enumerate(senders):
-            if each.piece is not None:
-                of_approaches.setdefault(each.approach, []).append(number)
-        for approach, numbers in of_approaches.items():
-            pieces = np.array([senders[number].piece for number in numbers])
-            for number, own in zip(numbers, approach.relations(pieces), strict=True):
-                related[number] = own[np.newaxis]
-        networks = senders[0].networks
-        rows = np.concatenate([each.reshape(-1, RELATIONS) for each in related])
-        messages = networks.messages(self.related(rows))
-        ends = np.cumsum([each.shape[0] * each.shape[1] for each in related])
-        return [
-            own.reshape(len(own), *each.shape[:2], MESSAGE).sum(axis=1)
-            for own, each in zip(np.split(messages, ends[:-1], axis=1), related, strict=True)
-        ]
+        def sent(pieces: FloatArray | None) -> list[SingleArray]:
+            is_site = pieces is None
+            related = approach.solids if pieces is None else approach.relations(pieces)
+            rows = self.related(related.reshape(-1, RELATIONS))
+            found = []
+            for networks, _ in kinds:
+                messages = networks.messages(rows)
+                of_each = messages.reshape(len(messages), *related.shape[:2], MESSAGE)
+                of_each = np.moveaxis(of_each, 1, 0)
+                total = of_each.sum(axis=0, keepdims=True) if is_site else of_each
+                found.append(np.ascontiguousarray(total))
+            return found
+
+        def make() -> KnownPieces:
+            of_shares = slice(FEATURES - SHARES, FEATURES)
+            bounds = self.mean[of_shares], self.scale[of_shares], _MOST_SPREADS
+            return KnownPieces(approach.ways, self.scaled(approach.on_empty), *bounds, sent)
+
+        return site.memory.numbers_of((self, approach, site.counts_peaks), make, layouts)
+
+    @staticmethod
+    def _starts(met: Sequence[tuple[Approach, KnownPieces, Numbers]]) -> IntArray:
+        """Return the first row of each structure of each layout (layouts x structures,)."""
+        found, first = [], 0
+        for approach, known, layouts in met:
+            of_layouts = first + known.points * np.arange(len(layouts))
+            found.append((of_layouts[:, np.newaxis] + approach.starts).ravel())
+            first += known.points * len(layouts)
+        return np.concatenate(found)
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return the scaled and bounded features of points (points, FEATURES)."""
@@ -455,20 +420,18 @@ class Surrogate:
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
 
 
-class _Sender(NamedTuple):
-    """A piece, or all structures, whose messages are wanted."""
-
-    networks: Networks
-    approach: Approach
-    piece: tuple[float, ...] | None = None
+_LAYOUT_ROWS: Final = 2**14
+"""Rows of inputs in memory together, about."""
 
 
-def _sum(messages: Sequence[SingleArray]) -> SingleArray:
-    """Return the sum of arrays, always in their order."""
-    total = messages[0].copy()
-    for each in messages[1:]:
-        total += each
-    return total
+def _differs(networks: Networks, known: KnownPieces, layouts: Numbers, which: int) -> FloatArray:
+    """Return the predictions at all points behind layouts, one after the other (members, rows)."""
+    some = max(_LAYOUT_ROWS // known.points, 1)
+    found = []
+    for first in range(0, len(layouts), some):
+        few = layouts[first : first + some]
+        found.append(networks.differs(known.inputs(few, which))[:, : len(few) * known.points])
+    return np.concatenate(found, axis=1)
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:
@@ -594,12 +557,3 @@ def _networks(members: Sequence[Sequence[Sequence[float]]]) -> Networks:
 
 def _numbers(array: AnyFloats) -> list[float]:
     return [float(f"{value:.5g}") for value in array.ravel()]
-
-
-def _silu(values: AnyFloats) -> SingleArray:
-    """Return x / (1 + exp(-x)), by the hyperbolic tangent for speed and without overflow."""
-    half: SingleArray = np.float32(0.5) * values
-    silu: SingleArray = np.tanh(half)
-    silu *= half
-    silu += half
-    return silu

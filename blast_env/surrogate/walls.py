@@ -1,12 +1,11 @@
 """Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
@@ -18,6 +17,7 @@ from blast_env.site import AnyStructure, Scenario
 from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.facade import NamedBay
 from blast_env.site.terraces import ground_below_m, is_open_below
+from blast_env.surrogate.pieces import Box, Memory
 from blast_env.surrogate.relations import RELATIONS, relations
 from blast_env.surrogate.ways import SHARES, Ways
 from blast_env.units import MODULE_SIDE_M
@@ -41,12 +41,8 @@ _LEAST_HEIGHT_M: Final = 0.3
 _LEAST_Z: Final = 0.2
 """Least scaled distance, m/kg^(1/3): nearer points have the reflected loads at this distance."""
 
-_MOST_BYTES: Final = 2**26
-
 _MOST_APPROACH_BYTES: Final = 2**28
 """Bound on the paths of the charges of a site: some 130 charges with the most points."""
-
-SingleArray = NDArray[np.float32]
 
 FEATURES: Final = 7 + 2 * SHARES
 """Inputs of a network per point: geometry and path shares."""
@@ -183,46 +179,6 @@ class Approach:
         return found
 
 
-class Memory:
-    """A cache of arrays that is cleared when it exceeds a bound; copies begin empty.
-
-    Args:
-        most_bytes: The bound.
-    """
-
-    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
-        self._most_bytes, self._bytes = most_bytes, 0
-        self._kept: dict[Hashable, SingleArray] = {}
-
-    def __reduce__(self) -> tuple[type["Memory"], tuple[int]]:
-        """Pickle the bound alone."""
-        return Memory, (self._most_bytes,)
-
-    def of_all(
-        self,
-        wanted: Iterable[Hashable],
-        make: Callable[[Sequence[Any]], Sequence[SingleArray]],
-    ) -> dict[Any, SingleArray]:
-        """Return the arrays of keys, which must not be modified.
-
-        Args:
-            wanted: The keys.
-            make: Makes the missing arrays from their keys.
-        """
-        distinct = dict.fromkeys(wanted)
-        found = {key: self._kept[key] for key in distinct if key in self._kept}
-        missing = [key for key in distinct if key not in found]
-        made = make(missing) if missing else ()
-        for key, array in zip(missing, made, strict=True):
-            found[key] = array
-            if self._bytes + array.nbytes > self._most_bytes:
-                self._kept.clear()
-                self._bytes = 0
-            self._kept[key] = array
-            self._bytes += array.nbytes
-        return found
-
-
 class SurrogateSite:
     """A scenario as the surrogate represents it.
 
@@ -232,11 +188,11 @@ class SurrogateSite:
 
     Args:
         scenario: The scenario.
-        memory: The cache of messages, which sites may share; by default a separate one.
+        memory: The cache of pieces, which sites may share; by default a separate one.
 
     Attributes:
         scenario: The scenario.
-        memory: The cache of messages.
+        memory: The cache of pieces.
         protected: The protected structures.
         counts_peaks: Whether the objective needs peak overpressures.
         alternatives: The bays of the facades, if the objective counts their response.
@@ -259,7 +215,7 @@ class SurrogateSite:
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
-        self._boxes: dict[Element, tuple[float, ...]] = {}
+        self._boxes: dict[Element, Box] = {}
         self._triangular = {
             each.name: TriangularLoads(
                 [bay for bay in self.alternatives if bay.structure == each.name]
@@ -316,20 +272,23 @@ class SurrogateSite:
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
-        zone = self.scenario.zone
-        rows = []
-        if zone.items:
-            for each in standing(layout):
-                if each not in self._boxes:
-                    height_m = zone.catalogue.variant(each).height_m
-                    self._boxes[each] = self._box(zone.element_rectangle_m(each), height_m)
-                rows.append(self._boxes[each])
-        else:
-            boxes = [zone.element_rectangle_m(each) for each in standing(layout)]
-            rows = [self._box(each, zone.height_m) for each in _in_lines(boxes)]
-        return np.array(rows, dtype=np.float64).reshape(-1, 5)
+        return np.array(self.boxes(layout), dtype=np.float64).reshape(-1, 5)
 
-    def _box(self, rectangle_m: Rectangle, own_m: float | None) -> tuple[float, ...]:
+    def boxes(self, layout: Sequence[Element]) -> list[Box]:
+        """Return the same piece by piece."""
+        zone = self.scenario.zone
+        if not zone.items:
+            sides = [zone.element_rectangle_m(each) for each in standing(layout)]
+            return [self._box(each, zone.height_m) for each in _in_lines(sides)]
+        found = []
+        for each in standing(layout):
+            if each not in self._boxes:
+                height_m = zone.catalogue.variant(each).height_m
+                self._boxes[each] = self._box(zone.element_rectangle_m(each), height_m)
+            found.append(self._boxes[each])
+        return found
+
+    def _box(self, rectangle_m: Rectangle, own_m: float | None) -> Box:
         """Return the rectangle and the top of a piece of a height, on its ground."""
         if not own_m:
             return (*rectangle_m, self.scenario.air_height_m)

@@ -116,6 +116,23 @@ class Ways:
         behind: IntArray = np.flatnonzero(is_behind)
         return behind, _open_shares(behind, stopped, is_straight_open, self.weights)
 
+    def stopped_by_each(self, solids: FloatArray) -> tuple[IntArray, BoolArray]:
+        """Return what each solid alone stops beside the structures.
+
+        Args:
+            solids: As for `shares`.
+
+        Returns:
+            Number of stopped paths by each place, from the lowest up (solids, points, stations,
+            asides), and whether the straight path is open (solids, points). Several solids
+            together stop as many paths as the one that stops most.
+        """
+        stopped = np.repeat(self.stopped[np.newaxis], len(solids), axis=0)
+        is_straight_open = np.repeat(self.is_straight_open[np.newaxis], len(solids), axis=0)
+        by = (self.by_m, self.by_height_m)
+        _stop_each(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
+        return stopped, is_straight_open
+
     @property
     def every(self) -> IntArray:
         """The indices of all points (points,)."""
@@ -191,6 +208,31 @@ def _open_shares(
                     shares[number, station * falls + fall] += left[fall]
         shares[number, -1] = is_straight_open[point]
     return shares
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stop_each(
+    start_m: FloatArray,
+    points_m: FloatArray,
+    by_m: FloatArray,
+    by_height_m: FloatArray,
+    solids: FloatArray,
+    stopped: IntArray,
+    is_straight_open: BoolArray,
+) -> None:
+    """Mark the paths that each solid blocks; see `Ways.stopped_by_each`."""
+    is_behind = np.zeros(len(points_m), dtype=np.bool_)
+    for number in range(len(solids)):
+        _stop(
+            start_m,
+            points_m,
+            by_m,
+            by_height_m,
+            solids[number : number + 1],
+            stopped[number],
+            is_straight_open[number],
+            is_behind,
+        )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
