@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.surrogate.layers import SingleArray, padded
-from blast_env.surrogate.ways import SHARES, Ways
+from blast_env.surrogate.ways import FALLS_M, SHARES, STATIONS, Ways
 
 Box = tuple[float, ...]
 """Left, bottom, right, top and height of a piece, m."""
@@ -23,6 +23,7 @@ Counts = NDArray[np.uint8]
 Numbers = NDArray[np.int32]
 
 _MOST_BYTES: Final = 2**26
+_FALLS: Final = len(FALLS_M)
 
 
 class KnownPieces:
@@ -50,7 +51,7 @@ class KnownPieces:
         self._ways, self._sent, self._bounds = ways, sent, (mean, scale, most)
         self._features = features.astype(np.float32)
         self._numbers: dict[Box, int] = {}
-        self._stopped: Counts = ways.stopped[np.newaxis].astype(np.uint8)
+        self._stopped: Counts = _of_places(ways.stopped[np.newaxis])
         self._is_open: BoolArray = ways.is_straight_open[np.newaxis]
         self._messages = sent(None)
 
@@ -92,7 +93,9 @@ class KnownPieces:
         _, members, points, length = messages.shape
         count = padded(len(layouts) * points)
         found = np.zeros((members, count, self._features.shape[1] + length), dtype=np.float32)
-        known = self._stopped, self._is_open, self._ways.weights
+        weights = self._ways.weights
+        weights = weights.reshape(len(weights), -1, *weights.shape[3:])
+        known = self._stopped, self._is_open, weights
         _put_inputs(layouts, *known, self._features, *self._bounds, messages, found)
         return found
 
@@ -103,10 +106,15 @@ class KnownPieces:
         stopped, is_open = self._ways.stopped_by_each(pieces)
         sent = self._sent(pieces)
         self._numbers.update(zip(boxes, range(first, first + len(boxes)), strict=True))
-        self._stopped = _with(self._stopped, stopped, first)
+        self._stopped = _with(self._stopped, _of_places(stopped), first)
         self._is_open = _with(self._is_open, is_open, first)
         pairs = zip(self._messages, sent, strict=True)
         self._messages = [_with(kept, more, first) for kept, more in pairs]
+
+
+def _of_places(stopped: NDArray[Any]) -> Counts:
+    """Return numbers of stopped paths by each place (pieces, points, stations x asides)."""
+    return stopped.reshape(*stopped.shape[:2], -1).astype(np.uint8)
 
 
 def _with(kept: NDArray[Any], more: NDArray[Any], first: int) -> NDArray[Any]:
@@ -133,42 +141,49 @@ def _put_inputs(
     found: SingleArray,
 ) -> None:
     """Put features and the sum of messages of each point behind each layout; see `inputs`."""
-    _, points, stations, asides = stopped.shape
-    members, length, falls = messages.shape[1], messages.shape[3], weights.shape[4]
+    _, points, places = stopped.shape
+    members, length = messages.shape[1], messages.shape[3]
     constant = features.shape[1] - SHARES
+    asides = places // len(STATIONS)
+    below = np.empty(places, dtype=np.uint8)
     shares = np.empty(SHARES)
+    changing = np.empty(SHARES, dtype=np.float32)
     for layout in range(len(layouts)):
         pieces = 0
         while layouts[layout, pieces] > 0:
             pieces += 1
-        own = layouts[layout, :pieces]
         for point in range(points):
             row = layout * points + point
-            shares[:] = 0.0
-            for station in range(stations):
-                for aside in range(asides):
-                    below = stopped[0, point, station, aside]
-                    for piece in own:
-                        below = max(below, stopped[piece, point, station, aside])
-                    for fall in range(falls):
-                        shares[station * falls + fall] += weights[
-                            point, station, aside, below, fall
-                        ]
             straight = is_open[0, point]
-            for piece in own:
+            for by in range(places):
+                below[by] = stopped[0, point, by]
+            for each in range(pieces):
+                piece = layouts[layout, each]
                 straight = straight and is_open[piece, point]
+                for by in range(places):
+                    below[by] = max(below[by], stopped[piece, point, by])
+            shares[:] = 0.0
             shares[-1] = 1.0 if straight else 0.0
+            for station in range(len(STATIONS)):
+                for by in range(station * asides, (station + 1) * asides):
+                    for fall in range(_FALLS):
+                        shares[station * _FALLS + fall] += weights[point, by, below[by], fall]
+            for share in range(SHARES):
+                scaled = (shares[share] - mean[share]) / scale[share]
+                changing[share] = min(max(scaled, -most), most)
             for member in range(members):
-                total = found[member, row]
-                total[:constant] = features[point, :constant]
-                for share in range(SHARES):
-                    scaled = (shares[share] - mean[share]) / scale[share]
-                    total[constant + share] = min(max(scaled, -most), most)
-                heard = total[constant + SHARES :]
-                heard[:] = messages[0, member, point]
-                for piece in own:
+                for each in range(constant):
+                    found[member, row, each] = features[point, each]
+                for each in range(SHARES):
+                    found[member, row, constant + each] = changing[each]
+                for each in range(length):
+                    found[member, row, constant + SHARES + each] = messages[0, member, point, each]
+                for number in range(pieces):
+                    piece = layouts[layout, number]
                     for each in range(length):
-                        heard[each] += messages[piece, member, point, each]
+                        found[member, row, constant + SHARES + each] += messages[
+                            piece, member, point, each
+                        ]
 
 
 class Memory:
