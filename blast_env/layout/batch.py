@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from math import fsum
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.geometry import Element, Layout
+from blast_env.geometry import Element, Layout, Measure
 from blast_env.layout.placement import LayoutState
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
@@ -28,7 +29,7 @@ class PlacementRules:
         dearest: The largest of these costs at a place that is legal on the empty site.
         sizes: Rows and columns of each variant; 0 and 0 of a measure.
         passable: Cells that are free of structures (rows, columns).
-        overlapping: Each variant that covers cells, with its rows and columns less one.
+        variants: Rows, columns and item of each variant (variants, 3).
     """
 
     scenario: Scenario
@@ -38,7 +39,7 @@ class PlacementRules:
     dearest: float
     sizes: tuple[tuple[int, int], ...]
     passable: BoolArray
-    overlapping: tuple[tuple[int, int, int], ...]
+    variants: IntArray
     _elements: dict[int, Element] = field(default_factory=dict, init=False, repr=False)
 
     def element(self, number: int) -> Element:
@@ -54,13 +55,17 @@ class PlacementRules:
         scenario, catalogue = start.scenario, start.catalogue
         sizes = tuple((each.rows, each.columns) for each in catalogue.variants)
         dearest = float(start.costs[start.fits].max(initial=0.0))
-        overlapping = tuple(
-            (number, rows - 1, columns - 1) for number, (rows, columns) in enumerate(sizes) if rows
-        )
+        variants = np.array(
+            [(each.rows, each.columns, each.item) for each in catalogue.variants], dtype=np.int64
+        ).reshape(-1, 3)
         return cls(
             *(scenario, scenario.zone, catalogue, start.costs, dearest, sizes, start.passable),
-            overlapping,
+            variants,
         )
+
+    def cost(self, number: int) -> float:
+        """Return the cost of an element by its number."""
+        return float(self.costs.item(number))
 
 
 class LayoutBatch:
@@ -80,6 +85,7 @@ class LayoutBatch:
         table: 1 where a variant has its lower left cell (layouts, variants, rows, columns).
         left: Pieces left in all, then of each item (layouts, 1 + items).
         budget_left: Remaining budget; 0 without one (layouts,).
+        is_full: Whether nothing more can be placed (layouts,).
         rules: The rules for each layout.
         layouts: The elements of each.
     """
@@ -91,73 +97,85 @@ class LayoutBatch:
         self.table: NDArray[np.int8] = np.zeros((count, *shape), dtype=np.int8)
         self.left: IntArray = np.zeros((count, 1 + len(start.catalogue.stocks)), dtype=np.int64)
         self.budget_left: FloatArray = np.zeros(count)
+        self.is_full: BoolArray = np.zeros(count, dtype=np.bool_)
         self.rules: list[PlacementRules] = [PlacementRules.of(start)] * count
         self.layouts: list[list[Element]] = [[] for _ in range(count)]
         self._spent: list[list[float]] = [[] for _ in range(count)]
 
-    def begin(self, index: int, rules: PlacementRules, start: LayoutState) -> None:
-        """Put a layout in the place of another one."""
-        self.rules[index] = rules
-        self.layouts[index] = list(start.layout)
-        self.legal[index], self.standing[index] = start.legal, start.standing
-        self.table[index] = 0
-        self._spent[index] = []
+    def begin(self, indices: Sequence[int], rules: PlacementRules, start: LayoutState) -> None:
+        """Put a layout in the place of others."""
+        if not indices:
+            return
+        catalogue, spent = rules.catalogue, []
+        table = np.zeros(self.table.shape[1:], dtype=np.int8)
+        left = np.array([start.stock_left, *catalogue.stocks])
         for element in start.layout:
-            place = rules.catalogue.variant_number(element), element[0], element[1]
-            self.table[index][place] = 1
-            self._spent[index].append(float(rules.costs[place]))
-        self.left[index, 0] = start.stock_left
-        self.left[index, 1:] = rules.catalogue.stocks
-        if rules.catalogue.has_items:
-            for element in start.layout:
-                self.left[index, 1 + rules.catalogue.variant(element).item] -= 1
-        else:
-            self.left[index, 1] = start.stock_left
-        self.budget_left[index] = start.budget_left or 0.0
+            number = catalogue.variant_number(element)
+            table[number, element[0], element[1]] = 1
+            spent.append(float(rules.costs[number, element[0], element[1]]))
+            if catalogue.has_items:
+                left[1 + catalogue.variants[number].item] -= 1
+        if not catalogue.has_items:
+            left[1] = start.stock_left
+        rows = slice(None) if len(indices) == len(self.rules) else indices
+        self.legal[rows], self.standing[rows] = start.legal, start.standing
+        self.table[rows], self.left[rows] = table, left
+        self.budget_left[rows] = start.budget_left or 0.0
+        self.is_full[rows] = not start.legal.any()
+        for index in indices:
+            self.rules[index] = rules
+            self.layouts[index] = list(start.layout)
+            self._spent[index] = spent.copy()
 
-    def place(self, index: int, number: int) -> None:
-        """Place an element on a legal place, by its number in the catalogue."""
-        rules, legal, left = self.rules[index], self.legal[index], self.left[index]
-        rows, columns = rules.catalogue.shape
-        variant, cell = divmod(number, rows * columns)
-        row, column = divmod(cell, columns)
-        self.layouts[index].append(rules.element(number))
-        self.table[index, variant, row, column] = 1
-        high, wide = rules.sizes[variant]
-        if high:
-            self.standing[index, row : row + high, column : column + wide] = variant + 1
-            above, beyond = row + high, column + wide
-            for other, up, right in rules.overlapping:
-                first, start = row - up, column - right
-                legal[other, max(first, 0) : above, max(start, 0) : beyond] = False
-        variants = rules.catalogue.variants
-        item = variants[variant].item
-        left[0] -= 1
-        left[1 + item] -= 1
-        if left[0] == 0:
-            legal[:] = False
-        elif left[1 + item] == 0:
-            for other, each in enumerate(variants):
-                if each.item == item:
-                    legal[other] = False
-        self._spent[index].append(float(rules.costs[variant, row, column]))
-        self._limit_to_budget(index)
-        if rules.zone.access_way is not None and high:
-            passable = rules.passable & (self.standing[index] == 0)
-            for own, closes in zip(
-                legal, closing_places(rules.zone.access_way, passable, rules.sizes), strict=True
-            ):
-                own &= ~closes
+    def place(self, indices: Sequence[int], numbers: Sequence[int]) -> None:
+        """Place an element on a legal place in each of some layouts.
 
-    def _limit_to_budget(self, index: int) -> None:
-        rules = self.rules[index]
+        Args:
+            indices: The layouts, different ones.
+            numbers: The number of the element in the catalogue, for each.
+        """
+        if not indices:
+            return
+        of_rules: dict[int, list[int]] = {}
+        for index, number in zip(indices, numbers, strict=True):
+            rules = self.rules[index]
+            self.layouts[index].append(rules.element(number))
+            if rules.zone.budget is not None or rules.zone.access_way is not None:
+                of_rules.setdefault(id(rules), []).append(index)
+            if rules.zone.budget is not None:
+                self._spent[index].append(rules.cost(number))
+        chosen = np.array(indices)
+        arrays = self.legal, self.standing, self.table, self.left
+        _place(chosen, np.array(numbers), self.rules[indices[0]].variants, *arrays)
+        for own in of_rules.values():
+            self._limit_to_budget(own)
+            self._keep_open(own)
+        _find_full(chosen, self.legal, self.is_full)
+
+    def _limit_to_budget(self, indices: Sequence[int]) -> None:
+        """Take away places beyond the budget, in layouts of the same rules."""
+        rules = self.rules[indices[0]]
         if rules.zone.budget is None:
             return
-        spent = fsum(self._spent[index])  # exact, so that the order does not matter
-        self.budget_left[index] = max(0.0, rules.zone.budget - spent)
+        spent = np.array([fsum(self._spent[index]) for index in indices])  # exact: in any order
+        self.budget_left[indices] = np.maximum(0.0, rules.zone.budget - spent)
         spendable = rules.zone.cost_limit - spent
-        if spendable < rules.dearest:
-            self.legal[index] &= rules.costs <= spendable
+        short = spendable < rules.dearest
+        if short.any():
+            _limit(np.array(indices)[short], spendable[short], rules.costs, self.legal)
+
+    def _keep_open(self, indices: Sequence[int]) -> None:
+        """Take away places that would close the access way, in layouts of the same rules."""
+        rules = self.rules[indices[0]]
+        if rules.zone.access_way is None:
+            return
+        for index in indices:
+            if isinstance(self.layouts[index][-1], Measure):
+                continue
+            passable = rules.passable & (self.standing[index] == 0)
+            closing = closing_places(rules.zone.access_way, passable, rules.sizes)
+            for own, closes in zip(self.legal[index], closing, strict=True):
+                own &= ~closes
 
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""
@@ -189,6 +207,55 @@ class LayoutBatch:
             [self.layouts[index] for index in chosen],
             *(legal, self.standing[rows], self.left[rows], self.budget_left[rows]),
         )
+
+
+@njit(cache=True, nogil=True)
+def _place(
+    indices: IntArray,
+    numbers: IntArray,
+    variants: IntArray,
+    legal: BoolArray,
+    standing: NDArray[np.uint8],
+    table: NDArray[np.int8],
+    left: IntArray,
+) -> None:
+    """Place an element in each of some layouts; arrays as in `PlacementRules`, `LayoutBatch`."""
+    _, count, rows, columns = legal.shape
+    for index, number in zip(indices, numbers):  # noqa: B905  # not known to Numba
+        variant, cell = number // (rows * columns), number % (rows * columns)
+        row, column = cell // columns, cell % columns
+        high, wide, item = variants[variant]
+        table[index, variant, row, column] = 1
+        standing[index, row : row + high, column : column + wide] = variant + 1
+        left[index, 0] -= 1
+        left[index, 1 + item] -= 1
+        for other in range(count):
+            if left[index, 0] == 0 or (
+                left[index, 1 + item] == 0 and variants[other, 2] == item
+            ):  # used up
+                legal[index, other] = False
+                continue
+            up, right = variants[other, 0] - 1, variants[other, 1] - 1
+            if high == 0 or up < 0:  # a measure covers no cell
+                continue
+            bottom, start = max(row - up, 0), max(column - right, 0)
+            legal[index, other, bottom : row + high, start : column + wide] = False
+
+
+@njit(cache=True, nogil=True)
+def _limit(indices: IntArray, spendable: FloatArray, costs: FloatArray, legal: BoolArray) -> None:
+    """Take away places that cost more than what may be spent (indices,)."""
+    for position, index in enumerate(indices):
+        own, most = legal[index].reshape(-1), spendable[position]
+        for place, cost in enumerate(costs.reshape(-1)):
+            own[place] &= cost <= most
+
+
+@njit(cache=True, nogil=True)
+def _find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
+    """Find whether each of some layouts has no legal place left."""
+    for index in indices:
+        is_full[index] = not legal[index].any()
 
 
 @dataclass(frozen=True, eq=False)

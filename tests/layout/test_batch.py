@@ -31,20 +31,21 @@ def test_a_layout_grows_as_one_placed_piece_by_piece(
         state = state.place(state.catalogue.element(int(rng.choice(legal))))
     batch = LayoutBatch(LayoutState.empty(scenario), 2)
     rules = PlacementRules.of(state)
-    batch.begin(0, rules, LayoutState.empty(scenario))
-    batch.begin(1, rules, state)
+    batch.begin([0], rules, LayoutState.empty(scenario))
+    batch.begin([1], rules, state)
     for _ in range(8):
         if state.is_full:
             break
         number = int(rng.choice(np.flatnonzero(state.legal)))
         state = state.place(state.catalogue.element(number))
-        batch.place(1, number)
+        batch.place([1], [number])
         found, expected = batch.placements([1]), Placements.of(state)
         assert (found.legal == state.legal).all()
         assert (found.standing == state.standing).all()
         assert (batch.table[1] == state.catalogue.table(state.layout)).all()
         assert found.layout(0) == expected.layout(0) == state.layout
         assert found.left[0, 0] == state.stock_left
+        assert batch.is_full.tolist() == [False, state.is_full]
         left = np.minimum(found.left[:, 1:], found.left[:, :1])
         assert left.tolist() == [list(state.stocks_left)]
         assert found.budget_left.tolist() == expected.budget_left.tolist()
