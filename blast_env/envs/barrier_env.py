@@ -214,7 +214,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 from that of the representative one.
         """
         super().reset(seed=seed)
-        self.episodes.begin(0, self.np_random, ResetOptions.from_mapping(options))
+        self.episodes.begin([0], [self.np_random], ResetOptions.from_mapping(options))
         if self.render_mode == "human":
             self._display.show(self._episode, self.placement)
         return self._observation(), self.episodes.information(0)
@@ -227,7 +227,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             gymnasium.error.ResetNeeded: If `reset` has not been called, or the episode has ended.
         """
         self._check(action)
-        self.episodes.place(0, int(action))
+        self.episodes.place([0], [int(action)])
         self.episodes.blast([0])
         observation = self._observation()
         reward = self.episodes.reward(0)

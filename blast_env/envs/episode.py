@@ -60,6 +60,9 @@ INVALID_ACTIONS: Final = ("nearest", "penalty")
 
 _NO_CHARGE: Final = Charge((0.0, 0.0), 0.0)
 _NOTHING: Final = Assessment(0.0, 0.0, 0.0, 0.0, False)
+_FINISHES: Final = -1
+"""In the place of an element's number: the action finishes."""
+
 _MOST_SHOWN: Final = 64
 """Most charges of a site for which the constant observations are kept."""
 
@@ -122,6 +125,7 @@ class _Shown:
     observable: Observable
     observation: EpisodeObservation
     actions: NumberedActions
+    charges: tuple[AnyCharge, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +190,7 @@ class _Site:
         among = bool(task.source.representative.vehicles)
         observable = Observable(self.empty.scenario, sources, among)
         observation = task.observation.episode(observable)
-        made = _Shown(observable, observation, self.actions.with_sources(sources))
+        made = _Shown(observable, observation, self.actions.with_sources(sources), charges)
         if isinstance(observation, BatchedObservation):  # others may keep a state
             _keep(self.shown, charges, made)
         return made
@@ -203,11 +207,12 @@ class Episode:
     """The state of an episode, besides its layout.
 
     Attributes:
+        task: The task.
         site: The common parts of its site.
         shown: What the agent is shown.
-        case: The scenario and the threats, and how their loads combine into one number.
-        terms: The terms of the last reward; before the first action all are 0.
+        seeds: Seeds of the blasts of each charge (charges, realisations).
         transition: The change by the last action.
+        terms: The terms of the last reward; before the first action all are 0.
         chosen: The choices so far for the next module or piece; `None` before the first.
         invalid_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
@@ -217,11 +222,12 @@ class Episode:
         loads: The loads with each layout against which the charges went off.
     """
 
+    task: Task
     site: _Site
     shown: _Shown
-    case: LoadCaseSet
-    terms: Terms
+    seeds: NDArray[np.int64]
     transition: Transition
+    terms: Terms
     chosen: ActionChoice | None = None
     invalid_actions: int = 0
     without_effect: int = 0
@@ -240,27 +246,37 @@ class Episode:
         return self.loads[self.transition.after], self.loads[()]
 
     @cached_property
-    def no_outcome(self) -> Mapping[str, Any]:
-        """The information on the blasts before the end: loads and counts are 0."""
-        return self.site.no_outcome(len(self.case.threats) // self.case.realisations)
+    def case(self) -> LoadCaseSet:
+        """The scenario and the threats, and how their loads combine into one number."""
+        of_charges = list(zip(self.shown.charges, self.seeds.tolist(), strict=True))
+        threats = tuple(
+            LoadCase(charge, seeds[number])
+            for number in range(self.task.realisations)
+            for charge, seeds in of_charges
+        )
+        scenario = self.site.empty.scenario
+        return LoadCaseSet(scenario, threats, self.task.realisations, self.task.risk)
+
+    @property
+    def loads_key(self) -> tuple[Any, ...]:
+        """What the loads without a barrier depend on; without noise, seeds have no effect."""
+        return self.case.threats if self.task.engine.has_noise else self.shown.charges
 
     @property
     def outcome(self) -> Mapping[str, Any]:
-        """The information on the blasts."""
+        """The information on the blasts; before the end, loads and counts are 0."""
         if not self.ended:
-            return self.no_outcome
+            return self.site.no_outcome(len(self.shown.charges))
         charges = self.case.charges_against(self.transition.after)
         return _outcome(self.evaluator, *self.assess(), charges)
 
-    @cached_property
+    @property
     def constants(self) -> Mapping[str, Any]:
         """The information that does not change in the episode."""
-        seeds = [threat.seed for threat in self.case.threats]
-        count = len(seeds) // self.case.realisations
         return {
             "scenario_hash": self.evaluator.scenario_hash,
             "calibration": self.evaluator.calibration_name,
-            "blast_seeds": tuple([tuple(seeds[index::count]) for index in range(count)]),
+            "blast_seeds": tuple(map(tuple, self.seeds.tolist())),
         }
 
 
@@ -320,14 +336,53 @@ class Episodes:
         self._sites: OrderedDict[int, _Site] = OrderedDict()
         self._most_sites = max(count, 4)
 
-    def begin(self, index: int, rng: np.random.Generator, options: ResetOptions) -> None:
-        """Draw an episode; options do not change the amount drawn from the random stream.
+    def begin(
+        self, indices: Sequence[int], rngs: Sequence[np.random.Generator], options: ResetOptions
+    ) -> None:
+        """Draw episodes; options do not change the amount drawn from the random streams.
+
+        Args:
+            indices: The episodes; at first all of them in their order.
+            rngs: The random numbers of each of them.
+            options: The fixed parts.
 
         Raises:
             LayoutError: If the layout of the options does not fit the build zone.
             ScenarioError: If the charge of the options is not clear of a structure or the border.
             BlastEnvError: If the scenario has another size than the representative one.
         """
+        is_empty = isinstance(options.layout, Sequence) and not options.layout
+        begins_as_site = is_empty and not options.fix_charge  # another type is refused by name
+        on_sites: dict[int, tuple[_Site, list[int]]] = {}
+        begun = []
+        for index, rng in zip(indices, rngs, strict=True):
+            site, charges, seeds = self._drawn(rng, options)
+            if begins_as_site:
+                start = site.empty
+                on_sites.setdefault(id(site), (site, []))[1].append(index)
+            else:
+                scenario = site.empty.scenario
+                if options.fix_charge:
+                    scenario = scenario.with_possible_charges(charges)
+                start = LayoutState.of(scenario, options.layout)
+                self.layouts.begin([index], PlacementRules.of(start), start)
+            initial = start.checked
+            turn = Transition(
+                site.empty.scenario.objective, *(initial,) * 3, begins=True, ended=False
+            )
+            shown = site.shown_of(self.task, charges)
+            begun.append(Episode(self.task, site, shown, seeds, turn, site.terms))
+        for site, own in on_sites.values():
+            self.layouts.begin(own, site.rules, site.empty)
+        for index, episode in zip(indices, begun, strict=True):
+            if index == len(self.running):
+                self.running.append(episode)
+            self.running[index] = episode
+
+    def _drawn(
+        self, rng: np.random.Generator, options: ResetOptions
+    ) -> tuple[_Site, tuple[AnyCharge, ...], NDArray[np.int64]]:
+        """Draw site, charges and seeds of blasts (charges, realisations) of an episode."""
         task = self.task
         scenario = task.source.sample(rng)
         site = self._site(scenario)
@@ -335,66 +390,70 @@ class Episodes:
         seeds = SeedRange.TRAINING.draw(rng, (len(drawn), task.realisations))
         if options.blast_seed is not None:
             seeds = options.blast_seed + np.arange(seeds.size).reshape(seeds.shape)
-        charges = tuple(options.charge(each) for each in drawn) if options.fix_charge else drawn
-        start, rules = site.empty, site.rules
-        is_empty = isinstance(options.layout, Sequence) and not options.layout
-        if options.fix_charge or not is_empty:  # another type is refused by name
-            possible = scenario.with_possible_charges(charges) if options.fix_charge else scenario
-            start = LayoutState.of(possible, options.layout)
-            rules = PlacementRules.of(start)
-        threats = tuple(
-            LoadCase(charge, seed)
-            for of_realisation in seeds.T.tolist()
-            for charge, seed in zip(charges, of_realisation, strict=True)
-        )
-        episode = Episode(
-            site,
-            site.shown_of(task, charges),
-            LoadCaseSet(scenario, threats, task.realisations, task.risk),
-            site.terms,
-            Transition(scenario.objective, *(start.checked,) * 3, begins=True, ended=False),
-        )
-        self.layouts.begin(index, rules, start)
-        if index == len(self.running):
-            self.running.append(episode)
-        self.running[index] = episode
+        if options.fix_charge:
+            drawn = tuple(options.charge(each) for each in drawn)
+        return site, drawn, seeds
 
-    def place(self, index: int, action: int) -> None:
-        """Make a choice, place a module or a piece, or finish.
+    def place(self, indices: Sequence[int], actions: Sequence[int]) -> None:
+        """Make a choice, place a module or a piece, or finish, in each of some episodes.
 
         Args:
-            index: The episode.
-            action: One of its `NumberedActions`.
+            indices: The episodes.
+            actions: One of its `NumberedActions` for each.
         """
-        episode, illegal = self.running[index], self.task.illegal
-        actions, choice = episode.shown.actions, self._choice(index)
-        before = episode.transition.after
-        finishes = action == actions.finish and choice.choices == 0
-        found = None if finishes else actions.narrowed(choice, action)
-        if found is None and not finishes:
+        layouts = self.layouts
+        made = [*map(self._made, indices, actions)]
+        placed = [
+            (index, found)
+            for index, found in zip(indices, made, strict=True)
+            if type(found) is int and found >= 0
+        ]
+        layouts.place([index for index, _ in placed], [found for _, found in placed])
+        is_full = layouts.is_full.tolist()
+        for index, action, found in zip(indices, actions, made, strict=True):
+            episode = self.running[index]
+            before = after = episode.transition.after
+            if type(found) is int and found >= 0:
+                after = CheckedLayout(layouts.layouts[index])
+                after.scenario = layouts.rules[index].scenario
+            stops = found == _FINISHES
+            if found is None:
+                episode.without_effect += 1
+                repeats = self.task.illegal.moves and action == episode.repeated
+                stops = repeats or episode.without_effect >= self.task.illegal.limit
+            episode.repeated = action if found is None else None
+            episode.ended = stops or is_full[index]
+            last = episode.transition
+            episode.transition = Transition(
+                last.objective, last.initial, before, after, not episode.begun, episode.ended
+            )
+            episode.begun = True
+
+    def _made(self, index: int, action: int) -> int | ActionChoice | None:
+        """Return what an action does in an episode, and record its choice.
+
+        Returns:
+            The number of the element to place, `_FINISHES`, a further choice; or `None` for an
+            illegal action without effect.
+        """
+        episode, legal = self.running[index], self.layouts.legal[index]
+        actions = episode.shown.actions
+        if actions.are_plain:  # the usual case, without the time to make a choice
+            if action == actions.finish:
+                return _FINISHES
+            if legal.item(action):
+                return action
+        choice = episode.chosen or ActionChoice(legal)
+        if action == actions.finish and choice.choices == 0:
+            return _FINISHES
+        found = actions.narrowed(choice, action)
+        if found is None:
             episode.invalid_actions += 1
-            nearest = actions.nearest(choice, action) if illegal.moves else None
+            nearest = actions.nearest(choice, action) if self.task.illegal.moves else None
             found = None if nearest is None else actions.narrowed(choice, nearest)
-        after = before
-        if isinstance(found, ActionChoice):
-            episode.chosen = found
-        elif found is not None:
-            self.layouts.place(index, found)
-            episode.chosen = None
-            after = CheckedLayout(self.layouts.layouts[index])
-            after.scenario = self.layouts.rules[index].scenario
-        has_effect = finishes or found is not None
-        episode.without_effect += not has_effect
-        repeats = illegal.moves and action == episode.repeated
-        exhausted = episode.without_effect >= illegal.limit
-        stops = finishes or (not has_effect and (repeats or exhausted))
-        episode.repeated = None if has_effect else action
-        episode.ended = stops or not self.layouts.legal[index].any()
-        objective, initial = episode.transition.objective, episode.transition.initial
-        episode.transition = Transition(
-            objective, initial, before, after, not episode.begun, episode.ended
-        )
-        episode.begun = True
+        if found is not None:
+            episode.chosen = found if isinstance(found, ActionChoice) else None
+        return found
 
     def blast(self, indices: Iterable[int]) -> None:
         """Set off the charges of episodes against the layouts that the last transition needs.
@@ -426,7 +485,7 @@ class Episodes:
             own = [next(loads) for _ in episode.case.threats]
             episode.loads[layout] = Assessment.of(episode.case, layout, own)
             if not layout:
-                _keep(episode.site.bare, _of_threats(episode), episode.loads[()])
+                _keep(episode.site.bare, episode.loads_key, episode.loads[()])
 
     def reward(self, index: int) -> float:
         """Return the reward of the last action, whose terms the information has.
@@ -520,11 +579,11 @@ class Episodes:
 
     def _is_known(self, episode: Episode, layout: Layout) -> bool:
         """Take the loads without a barrier from an earlier episode of the same threats."""
-        known = None if layout else episode.site.bare.get(_of_threats(episode))
+        known = None if layout else episode.site.bare.get(episode.loads_key)
         if known is None:
             return False
         episode.loads[()] = known
-        episode.evaluator.counts.cache_hits += len(episode.case.threats)
+        episode.evaluator.counts.cache_hits += episode.seeds.size
         return True
 
     def _site(self, scenario: Scenario) -> _Site:
@@ -537,14 +596,6 @@ class Episodes:
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)
         return found
-
-
-def _of_threats(episode: Episode) -> tuple[Any, ...]:
-    """Return what the loads without a barrier depend on; without noise, seeds have no effect."""
-    threats = episode.case.threats
-    if episode.evaluator.engine.has_noise:
-        return threats
-    return tuple([each.charge for each in threats])
 
 
 VISIBLE_REALISATIONS: Final = 2

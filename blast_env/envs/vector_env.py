@@ -1,6 +1,6 @@
 """The vector entry point of `gymnasium.make_vec`: many barrier environments in one batch."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import gymnasium as gym
@@ -74,6 +74,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self._seeds: list[int | None] = [None] * self.num_envs
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
+        self._noted: dict[str, NDArray[Any]] = {}
 
     def reset(
         self,
@@ -146,13 +147,14 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         if not self._running or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
             raise gym.error.ResetNeeded(f"call reset: no episode in environments {begun}")
         wanted = self._checked(actions, played)
-        for index in played:
-            self.episodes.place(index, wanted[index])
+        self.episodes.place(played, [wanted[index] for index in played])
         self.episodes.blast(played)
         rewards = np.zeros(self.num_envs)
         rewards[played] = [self.episodes.reward(index) for index in played]
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         terminated[played] = [self._running[index].ended for index in played]
+        for index in _indices(terminated):
+            self._note(index, self._running[index].outcome)
         self._steps[played] += 1
         truncated = self._steps >= self._most_steps
         truncated[begun] = False
@@ -200,11 +202,24 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 
     def _begin(self, chosen: Sequence[int], options: ResetOptions) -> None:
         """Begin an episode in some environments; the first time in all."""
-        for index in chosen if self._running else self._all:
-            rng = self._rngs[index]
-            assert rng is not None
-            self.episodes.begin(index, rng, options)
+        if not chosen:
+            return
+        chosen = chosen if self._running else self._all
+        rngs = [rng for index in chosen if (rng := self._rngs[index]) is not None]
+        self.episodes.begin(chosen, rngs, options)
         self._steps[chosen] = 0
+        for index in chosen:
+            episode = self._running[index]
+            self._note(index, episode.constants)
+            self._note(index, episode.outcome)
+
+    def _note(self, index: int, values: Mapping[str, Any]) -> None:
+        """Note values of the information of an environment until others take their place."""
+        for name, value in values.items():
+            noted = self._noted.get(name)
+            if noted is None:
+                noted = self._noted[name] = _like(value, self.num_envs)
+            noted[index] = value
 
     def _begin_again(self, over: Sequence[int]) -> dict[str, Any]:
         """Begin episodes where others have ended; return the last observation and information."""
@@ -238,19 +253,11 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             "invalid_actions": np.array([each.invalid_actions for each in running]),
             "placed": np.array([len(each) for each in layouts.layouts]),
             "layout": layouts.table.copy(),
-        }
-        for name in running[0].constants:
-            arrays[name] = _objects([each.constants[name] for each in running])
-        ended = [index for index, each in enumerate(running) if each.ended]
-        outcomes = {index: running[index].outcome for index in ended}
-        for name, first in running[0].no_outcome.items():
-            own = _like(first, [each.no_outcome[name] for each in running])
-            for index in ended:
-                own[index] = outcomes[index][name]
-            arrays[name] = own
+        } | {name: each.copy() for name, each in self._noted.items()}
         terms = {name: np.array([each.terms[name] for each in running]) for name in names}
-        for values in (*arrays.values(), *terms.values()):
-            values[~known] = None if values.dtype == object else 0
+        if not known.all():
+            for values in (*arrays.values(), *terms.values()):
+                values[~known] = None if values.dtype == object else 0
         arrays["reward_terms"] = terms | {f"_{name}": known.copy() for name in terms}
         return arrays | {f"_{name}": known.copy() for name in arrays}
 
@@ -258,18 +265,11 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 _NUMBERS: Final = (bool, int, float)
 
 
-def _like(first: Any, values: Sequence[Any]) -> NDArray[Any]:
-    """Return values before the end in an array: numbers are 0, others objects."""
-    if isinstance(first, _NUMBERS):
-        return np.zeros(len(values), dtype=type(first))
-    return _objects(values)
-
-
-def _objects(values: Sequence[Any]) -> NDArray[np.object_]:
-    array = np.empty(len(values), dtype=object)
-    for index, value in enumerate(values):
-        array[index] = value
-    return array
+def _like(value: Any, count: int) -> NDArray[Any]:
+    """Return an array for values like one: of numbers, else of objects."""
+    if isinstance(value, _NUMBERS):
+        return np.zeros(count, dtype=type(value))
+    return np.empty(count, dtype=object)
 
 
 def _indices(mask: BoolArray) -> list[int]:

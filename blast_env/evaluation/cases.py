@@ -23,7 +23,7 @@ from blast_env.site import (
     find_scenario,
 )
 from blast_env.site.blast_site import Charge
-from blast_env.site.objective import MeanRisk, Risk
+from blast_env.site.objective import MeanRisk, Risk, WorstRisk
 from blast_env.site.sources import ranked
 from blast_env.values import checked_seed, generator
 
@@ -242,11 +242,13 @@ class LoadCaseSet:
         Args:
             loads: One per threat, in their order; all, or only the first ones, at least one.
         """
+        risk = self.risk or self.scenario.objective.risk
+        if len(loads) == 1 and isinstance(risk, MeanRisk | WorstRisk):
+            return float(loads[0])
         values = np.asarray(loads, dtype=np.float64)
         count = len(self.threats) // self.realisations
         if len(values) > count:
             values = np.array([values[index::count].mean() for index in range(count)])
-        risk = self.risk or self.scenario.objective.risk
         return risk(values)
 
     def objective_value(

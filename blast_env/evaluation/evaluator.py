@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
+from math import nan
 from pathlib import Path
 from typing import Final, Self
 
@@ -34,7 +35,6 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
-from blast_env.statistics import reductions
 from blast_env.units import PA_PER_PSI
 
 
@@ -420,7 +420,7 @@ class Assessment:
 
     def reduction_from(self, unprotected: "Assessment") -> float:
         """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
-        return reductions(self.load, unprotected.load).item()
+        return 1.0 - self.load / unprotected.load if unprotected.load > 0.0 else nan
 
 
 @dataclass(eq=False)

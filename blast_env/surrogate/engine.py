@@ -23,9 +23,52 @@ from blast_env.surrogate.walls import SurrogateSite, site_of
 SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""
 
+_NOTES: Final = ("a prediction of the surrogate, not a blast",)
 _GUESSED: Final = ReasonedStanding(LoadStanding.APPROXIMATE, "a guess of gas dynamics")
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
+
+
+def _zero_loads(site: SurrogateSite) -> tuple[StructureLoad, ...]:
+    """Return no load on each structure, which is that of those that are not protected."""
+    peak_pa = 0.0 if site.counts_peaks else None
+    return tuple(
+        StructureLoad.on(each, 0.0, peak_pa, notes=_NOTES, stood=_GUESSED)
+        for each in site.scenario.structures
+    )
+
+
+class _Served:
+    """A site, with what the loads of all its predictions have in common."""
+
+    def __init__(self, site: SurrogateSite) -> None:
+        self.site = site
+        structures = site.scenario.structures
+        self._zero_loads = _zero_loads(site)
+        self._place = {each.name: number for number, each in enumerate(structures)}
+        self._of_modules = np.repeat(np.arange(len(structures)), [s.modules for s in structures])
+
+    def loads(self, guess: Guess) -> list[BlastLoads]:
+        """Return the loads of each layout of a prediction."""
+        impulses_pa_s = guess.impulse_pa_s.tolist()
+        peaks_pa = guess.peak_pa.tolist() if guess.peak_pa is not None else None
+        found = []
+        for index, of_layout in enumerate(impulses_pa_s):
+            loads, on_each = list(self._zero_loads), np.zeros(len(self._zero_loads))
+            for column, structure in enumerate(self.site.protected):
+                place = self._place[structure.name]
+                loads[place] = StructureLoad.on(
+                    structure,
+                    of_layout[column],
+                    None if peaks_pa is None else peaks_pa[index][column],
+                    notes=_NOTES,
+                    stood=_GUESSED,
+                )
+                on_each[place] = of_layout[column]
+            responds = self.site.scenario.objective.is_response
+            bays = guess.bays(self.site, index) if responds else ()
+            found.append(BlastLoads(tuple(loads), on_each[self._of_modules], bays))
+        return found
 
 
 @dataclass(frozen=True)
@@ -56,7 +99,7 @@ class SurrogateEngine(Engine):
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
-    _sites: OrderedDict[str, SurrogateSite] = field(
+    _sites: OrderedDict[str, _Served] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
     )
     _memory: Memory = field(default_factory=Memory, init=False, repr=False, compare=False)
@@ -108,46 +151,24 @@ class SurrogateEngine(Engine):
         for numbers in of_sites.values():
             own = [blasts[number] for number in numbers]
             with compilation_notice("the surrogate (some 10 s)"):
-                site = self._site(own[0].scenario)
+                served = self._site(own[0].scenario)
                 charges = [charge_against(*each[:3]) for each in own]
-                guess = self.surrogate.guess(site, [each.layout for each in own], charges)
+                layouts = [each.layout for each in own]
+                guess = self.surrogate.guess(served.site, layouts, charges)
             if self.safe:
                 guess = self.surrogate.upper_ends(guess, np.array([bool(e.layout) for e in own]))
-            for index, number in enumerate(numbers):
-                found[number] = _loads(site, guess, index)
+            for number, loads in zip(numbers, served.loads(guess), strict=True):
+                found[number] = loads
         return [each for each in found if each is not None]
 
-    def _site(self, scenario: Scenario) -> SurrogateSite:
+    def _site(self, scenario: Scenario) -> _Served:
         key = scenario.content_hash
         if key not in self._sites:
-            self._sites[key] = site_of(scenario, self._memory)
+            self._sites[key] = _Served(site_of(scenario, self._memory))
             if len(self._sites) > _KEPT_SITES:
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)
         return self._sites[key]
-
-
-def _loads(site: SurrogateSite, guess: Guess, index: int) -> BlastLoads:
-    """Return the loads of one layout of a prediction."""
-    structures = site.scenario.structures
-    impulse_pa_s = dict.fromkeys([each.name for each in structures], 0.0)
-    peak_pa: dict[str, float | None] = dict.fromkeys(
-        impulse_pa_s, None if guess.peak_pa is None else 0.0
-    )
-    names = [each.name for each in site.protected]
-    impulse_pa_s.update(zip(names, guess.impulse_pa_s[index].tolist(), strict=True))
-    if guess.peak_pa is not None:
-        peak_pa.update(zip(names, guess.peak_pa[index].tolist(), strict=True))
-    notes = ("a prediction of the surrogate, not a blast",)
-    loads = tuple(
-        StructureLoad.on(
-            each, impulse_pa_s[each.name], peak_pa[each.name], notes=notes, stood=_GUESSED
-        )
-        for each in structures
-    )
-    on_modules = np.repeat([*impulse_pa_s.values()], [each.modules for each in structures])
-    bays = guess.bays(site, index) if site.scenario.objective.is_response else ()
-    return BlastLoads(loads, on_modules, bays)
 
 
 def is_surrogate(name: str) -> bool:
