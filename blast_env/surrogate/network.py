@@ -24,8 +24,8 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.response.damage import BayDamage
 from blast_env.site.blast_site import Charge
-from blast_env.surrogate.layers import SingleArray, active_layer, last_layer, padded, runs
-from blast_env.surrogate.pieces import Box, KnownPieces, Numbers
+from blast_env.surrogate.layers import SingleArray, first_sums, two_layers
+from blast_env.surrogate.pieces import Box, KnownPieces, Numbers, PointLayers
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SurrogateSite
 from blast_env.surrogate.ways import SHARES
@@ -219,13 +219,9 @@ class Networks:
             scaled: Their relations, less the mean, over the scale (solids x points, RELATIONS).
         """
         layers = self._layers
-        found = np.empty((len(self.members), padded(len(scaled)), MESSAGE), dtype=np.float32)
-        given = np.zeros((1, found.shape[1], scaled.shape[1]), dtype=np.float32)
-        given[0, : len(scaled)] = scaled
-        for few in runs(found.shape[1]):
-            sent = active_layer(given, layers.send, layers.send_bias, few)
-            found[:, few] = active_layer(sent, layers.message, layers.message_bias)
-        return found[:, : len(scaled)]
+        given = np.ascontiguousarray(scaled, dtype=np.float32)[np.newaxis]
+        found: SingleArray = two_layers(given, *layers[:4])
+        return found
 
     def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
         """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
@@ -237,25 +233,34 @@ class Networks:
         Returns:
             (members, points).
         """
+        layers = self._layers
         members, points, _ = heard.shape
-        both = np.zeros((members, padded(points), FEATURES + MESSAGE), dtype=np.float32)
-        both[:, :points, :FEATURES] = scaled
-        both[:, :points, FEATURES:] = heard
-        return self.differs(both)[:, :points]
+        both = np.empty((members, points, FEATURES + MESSAGE), dtype=np.float32)
+        both[..., :FEATURES], both[..., FEATURES:] = scaled, heard
+        second = two_layers(
+            both, layers.first, layers.first_bias, layers.second, layers.second_bias
+        )
+        return np.einsum("mpi,mi->mp", second, layers.last[..., 0]) + layers.last_bias
 
-    def differs(self, both: SingleArray) -> FloatArray:
-        """Return the same (members, rows) from a padded number of rows of inputs.
+    def at_points(self, scaled: FloatArray, heard: SingleArray) -> PointLayers:
+        """Return the layers for points whose open shares and further messages are yet unknown.
 
         Args:
-            both: Scaled features and the sum of messages (members, rows, FEATURES + MESSAGE).
+            scaled: As for a call; open shares are those on the empty site.
+            heard: Sum of the messages of the structures (members, points, MESSAGE).
         """
-        layers = self._layers
-        found = np.empty(both.shape[:2])
-        for few in runs(both.shape[1]):
-            first = active_layer(both, layers.first, layers.first_bias, few)
-            second = active_layer(first, layers.second, layers.second_bias)
-            found[:, few] = last_layer(second, layers.last, layers.last_bias)
-        return found
+        layers, constant = self._layers, FEATURES - SHARES
+        both = np.empty((*heard.shape[:2], constant + MESSAGE), dtype=np.float32)
+        both[..., :constant], both[..., constant:] = scaled[:, :constant], heard
+        weights = np.concatenate((layers.first[:, :constant], layers.first[:, FEATURES:]), axis=1)
+        return PointLayers(
+            first_sums(both, weights, layers.first_bias),
+            np.ascontiguousarray(layers.first[:, constant:]),
+            layers.second,
+            layers.second_bias,
+            np.ascontiguousarray(layers.last[..., 0]),
+            np.ascontiguousarray(layers.last_bias[:, 0]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,8 +316,8 @@ class Surrogate:
         starts = self._starts(met)
 
         def of(which: int, known: Callable[[Approach], FloatArray]) -> list[FloatArray]:
-            networks, power = self._of_loads[which]
-            differs = [_differs(networks, *of_group, which) for _, *of_group in met]
+            power = self._of_loads[which][1]
+            differs = [each.differs(own, which) for _, each, own in met]
             logs = [np.tile(known(each), len(own)) for each, _, own in met]
             loads = log_loads(
                 np.concatenate(differs, axis=1), np.concatenate(logs), area_m2, starts, power
@@ -381,23 +386,24 @@ class Surrogate:
         """Return what is known of the pieces of layouts under one charge, and their numbers."""
         kinds = self._of_loads if site.counts_peaks else self._of_loads[:1]
 
-        def sent(pieces: FloatArray | None) -> list[SingleArray]:
-            is_site = pieces is None
-            related = approach.solids if pieces is None else approach.relations(pieces)
+        def sent(related: FloatArray) -> list[SingleArray]:
             rows = self.related(related.reshape(-1, RELATIONS))
-            found = []
-            for networks, _ in kinds:
-                messages = networks.messages(rows)
-                of_each = messages.reshape(len(messages), *related.shape[:2], MESSAGE)
-                of_each = np.moveaxis(of_each, 1, 0)
-                total = of_each.sum(axis=0, keepdims=True) if is_site else of_each
-                found.append(np.ascontiguousarray(total))
-            return found
+            of_all = [each.messages(rows) for each, _ in kinds]
+            return [
+                own.reshape(len(own), *related.shape[:2], MESSAGE).swapaxes(0, 1) for own in of_all
+            ]
 
         def make() -> KnownPieces:
             of_shares = slice(FEATURES - SHARES, FEATURES)
             bounds = self.mean[of_shares], self.scale[of_shares], _MOST_SPREADS
-            return KnownPieces(approach.ways, self.scaled(approach.on_empty), *bounds, sent)
+            scaled = self.scaled(approach.on_empty)
+            layers = [
+                networks.at_points(scaled, each.sum(axis=0))
+                for (networks, _), each in zip(kinds, sent(approach.solids), strict=True)
+            ]
+            return KnownPieces(
+                approach.ways, bounds, layers, lambda pieces: sent(approach.relations(pieces))
+            )
 
         return site.memory.numbers_of((self, approach, site.counts_peaks), make, layouts)
 
@@ -418,20 +424,6 @@ class Surrogate:
     def related(self, relations: FloatArray) -> FloatArray:
         """Return the scaled and bounded relations (solids x points, RELATIONS)."""
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
-
-
-_LAYOUT_ROWS: Final = 2**14
-"""Rows of inputs in memory together, about."""
-
-
-def _differs(networks: Networks, known: KnownPieces, layouts: Numbers, which: int) -> FloatArray:
-    """Return the predictions at all points behind layouts, one after the other (members, rows)."""
-    some = max(_LAYOUT_ROWS // known.points, 1)
-    found = []
-    for first in range(0, len(layouts), some):
-        few = layouts[first : first + some]
-        found.append(networks.differs(known.inputs(few, which))[:, : len(few) * known.points])
-    return np.concatenate(found, axis=1)
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:

@@ -6,14 +6,16 @@ that stops most. Messages add up. So each piece is computed once per charge.
 """
 
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.surrogate.layers import SingleArray, padded
+from blast_env.gas.simd import place
+from blast_env.gas.state import FUSED
+from blast_env.surrogate.layers import ROWS_AT_ONCE, SingleArray, four_rows, four_sums
 from blast_env.surrogate.ways import FALLS_M, SHARES, STATIONS, Ways
 
 Box = tuple[float, ...]
@@ -26,44 +28,63 @@ _MOST_BYTES: Final = 2**26
 _FALLS: Final = len(FALLS_M)
 
 
+class PointLayers(NamedTuple):
+    """The layers of networks that predict at a point, and what they know without a layout.
+
+    Attributes:
+        base: Sums of the first layer over all inputs that no layout changes, and the messages of
+            the structures (members, points, width).
+        first: Its weights of open shares and messages (members, SHARES + length, width).
+        second: Weights of the second layer (members, width, width).
+        second_bias: Its biases (members, width).
+        last: Weights of the last layer (members, width).
+        last_bias: Its bias (members,).
+    """
+
+    base: SingleArray
+    first: SingleArray
+    second: SingleArray
+    second_bias: SingleArray
+    last: SingleArray
+    last_bias: SingleArray
+
+
 class KnownPieces:
     """The structures of a site and the pieces met so far, for one charge.
 
     Args:
         ways: The paths from the charge to the points.
-        features: Scaled features of the points on the empty site (points, FEATURES).
-        mean: Mean of each open share (SHARES,).
-        scale: Their standard deviations (SHARES,).
-        most: Bound on the scaled values.
-        sent: Returns the messages of the structures (`None`), or of each of several pieces, by each
-            set of networks (pieces, members, points, MESSAGE).
+        bounds: Mean and standard deviation of each open share (SHARES,), and the bound on the
+            scaled values.
+        layers: The layers of each set of networks.
+        sent: Returns the messages of several pieces by each set of networks (pieces, members,
+            points, length).
     """
 
     def __init__(
         self,
         ways: Ways,
-        features: FloatArray,
-        mean: FloatArray,
-        scale: FloatArray,
-        most: float,
-        sent: Callable[[FloatArray | None], list[SingleArray]],
+        bounds: tuple[FloatArray, FloatArray, float],
+        layers: Sequence[PointLayers],
+        sent: Callable[[FloatArray], list[SingleArray]],
     ) -> None:
-        self._ways, self._sent, self._bounds = ways, sent, (mean, scale, most)
-        self._features = features.astype(np.float32)
+        self._ways, self._bounds, self._layers, self._sent = ways, bounds, layers, sent
         self._numbers: dict[Box, int] = {}
         self._stopped: Counts = _of_places(ways.stopped[np.newaxis])
         self._is_open: BoolArray = ways.is_straight_open[np.newaxis]
-        self._messages = sent(None)
+        empty = [(0, len(each.base), self.points, len(each.first[0]) - SHARES) for each in layers]
+        self._messages = [np.zeros((1, *shape[1:]), dtype=np.float32) for shape in empty]
 
     @property
     def points(self) -> int:
         """Number of points."""
-        return len(self._features)
+        return len(self._ways.points_m)
 
     @property
     def nbytes(self) -> int:
         """Size in memory."""
         of_messages = sum(each.nbytes for each in self._messages)
+        of_messages += sum(each.base.nbytes for each in self._layers)
         return self._stopped.nbytes + self._is_open.nbytes + of_messages
 
     def numbers_of(self, layouts: Sequence[Sequence[Box]]) -> Numbers:
@@ -80,23 +101,17 @@ class KnownPieces:
             own[: len(each)] = [numbers[box] for box in each]
         return found
 
-    def inputs(self, layouts: Numbers, networks: int) -> SingleArray:
-        """Return the inputs of networks for layouts (members, rows, FEATURES + MESSAGE).
-
-        Rows are the points of one layout after the other, then zeros up to a padded number.
+    def differs(self, layouts: Numbers, networks: int) -> SingleArray:
+        """Return the predictions at the points behind layouts (members, layouts x points).
 
         Args:
             layouts: See `numbers_of`.
             networks: Number of the set of networks.
         """
-        messages = self._messages[networks]
-        _, members, points, length = messages.shape
-        count = padded(len(layouts) * points)
-        found = np.zeros((members, count, self._features.shape[1] + length), dtype=np.float32)
         weights = self._ways.weights
-        weights = weights.reshape(len(weights), -1, *weights.shape[3:])
-        known = self._stopped, self._is_open, weights
-        _put_inputs(layouts, *known, self._features, *self._bounds, messages, found)
+        by_place = weights.reshape(len(weights), -1, *weights.shape[3:])
+        known = self._stopped, self._is_open, by_place, self._messages[networks]
+        found: SingleArray = _differs(layouts, *known, *self._bounds, *self._layers[networks])
         return found
 
     def _meet(self, boxes: Sequence[Box]) -> None:
@@ -127,63 +142,90 @@ def _with(kept: NDArray[Any], more: NDArray[Any], first: int) -> NDArray[Any]:
     return kept
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _put_inputs(
-    layouts: Numbers,
-    stopped: Counts,
-    is_open: BoolArray,
-    weights: FloatArray,
-    features: SingleArray,
-    mean: FloatArray,
-    scale: FloatArray,
-    most: float,
-    messages: SingleArray,
-    found: SingleArray,
+@njit(error_model="numpy")
+def _put_shares(
+    own: Any, stopped: Any, is_open: Any, weights: Any, mean: Any, scale: Any, most: Any, found: Any
 ) -> None:
-    """Put features and the sum of messages of each point behind each layout; see `inputs`."""
+    """Put the scaled open shares of each point behind the pieces of a layout (points, SHARES)."""
     _, points, places = stopped.shape
-    members, length = messages.shape[1], messages.shape[3]
-    constant = features.shape[1] - SHARES
     asides = places // len(STATIONS)
     below = np.empty(places, dtype=np.uint8)
     shares = np.empty(SHARES)
-    changing = np.empty(SHARES, dtype=np.float32)
-    for layout in range(len(layouts)):
-        pieces = 0
-        while layouts[layout, pieces] > 0:
-            pieces += 1
-        for point in range(points):
-            row = layout * points + point
-            straight = is_open[0, point]
+    for point in range(points):
+        straight = is_open[0, point]
+        for by in range(places):
+            below[by] = stopped[0, point, by]
+        for piece in own:
+            if piece == 0:
+                break
+            straight = straight and is_open[piece, point]
             for by in range(places):
-                below[by] = stopped[0, point, by]
-            for each in range(pieces):
-                piece = layouts[layout, each]
-                straight = straight and is_open[piece, point]
-                for by in range(places):
-                    below[by] = max(below[by], stopped[piece, point, by])
-            shares[:] = 0.0
-            shares[-1] = 1.0 if straight else 0.0
-            for station in range(len(STATIONS)):
-                for by in range(station * asides, (station + 1) * asides):
-                    for fall in range(_FALLS):
-                        shares[station * _FALLS + fall] += weights[point, by, below[by], fall]
-            for share in range(SHARES):
-                scaled = (shares[share] - mean[share]) / scale[share]
-                changing[share] = min(max(scaled, -most), most)
-            for member in range(members):
-                for each in range(constant):
-                    found[member, row, each] = features[point, each]
-                for each in range(SHARES):
-                    found[member, row, constant + each] = changing[each]
-                for each in range(length):
-                    found[member, row, constant + SHARES + each] = messages[0, member, point, each]
-                for number in range(pieces):
-                    piece = layouts[layout, number]
+                below[by] = max(below[by], stopped[piece, point, by])
+        shares[:] = 0.0
+        shares[-1] = 1.0 if straight else 0.0
+        for station in range(len(STATIONS)):
+            for by in range(station * asides, (station + 1) * asides):
+                for fall in range(_FALLS):
+                    shares[station * _FALLS + fall] += weights[point, by, below[by], fall]
+        for share in range(SHARES):
+            scaled = (shares[share] - mean[share]) / scale[share]
+            found[point, share] = min(max(scaled, -most), most)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+def _differs(
+    layouts: Any,
+    stopped: Any,
+    is_open: Any,
+    weights: Any,
+    messages: Any,
+    mean: Any,
+    scale: Any,
+    most: Any,
+    base: Any,
+    first: Any,
+    second: Any,
+    second_bias: Any,
+    last: Any,
+    last_bias: Any,
+) -> Any:
+    """Return the predictions at the points behind each layout; see `KnownPieces.differs`."""
+    members, points, width = base.shape
+    inputs, length = first.shape[1], messages.shape[3]
+    found = np.empty((members, len(layouts) * points), dtype=np.float32)
+    shares = np.empty((points, SHARES), dtype=np.float32)
+    given = np.empty((ROWS_AT_ONCE, inputs), dtype=np.float32)
+    middle = np.empty(ROWS_AT_ONCE * width, dtype=np.float32)
+    end = np.empty(ROWS_AT_ONCE * width, dtype=np.float32)
+    at, between, beyond = place(given), place(middle), place(end)
+    same = 0, 0, 0, 0
+    for layout in range(len(layouts)):
+        _put_shares(layouts[layout], stopped, is_open, weights, mean, scale, most, shares)
+        for member in range(members):
+            bases, to_first = place(base[member]), place(first[member])
+            to_second, bias = place(second[member]), place(second_bias[member])
+            to_last = place(last[member])
+            for point in range(0, points, ROWS_AT_ONCE):
+                for number in range(ROWS_AT_ONCE):
+                    row = min(point + number, points - 1)
+                    for each in range(SHARES):
+                        given[number, each] = shares[row, each]
                     for each in range(length):
-                        found[member, row, constant + SHARES + each] += messages[
-                            piece, member, point, each
-                        ]
+                        given[number, SHARES + each] = np.float32(0.0)
+                    for piece in layouts[layout]:
+                        if piece == 0:
+                            break
+                        for each in range(length):
+                            given[number, SHARES + each] += messages[piece, member, row, each]
+                at_1, at_2 = min(point + 1, points - 1), min(point + 2, points - 1)
+                at_3 = min(point + 3, points - 1)
+                rows = point * width, at_1 * width, at_2 * width, at_3 * width
+                four_rows(at, inputs, to_first, width, bases, rows, between)
+                four_rows(between, width, to_second, width, bias, same, beyond)
+                sums = four_sums(beyond, width, to_last, last_bias[member])
+                for number in range(min(ROWS_AT_ONCE, points - point)):
+                    found[member, layout * points + point + number] = sums[number]
+    return found
 
 
 class Memory:
