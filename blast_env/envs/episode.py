@@ -117,6 +117,28 @@ class Task:
         """Return what runs the blasts of a site; see `BlastEvaluator` for errors."""
         return BlastEvaluator(scenario, self.engine, cache=self.store, counts=self.counts)
 
+    def case(
+        self,
+        scenario: Scenario,
+        charges: tuple[AnyCharge, ...],
+        seeds: NDArray[np.int64] | None = None,
+    ) -> LoadCaseSet:
+        """Return the scenario and the threats of an episode.
+
+        Args:
+            scenario: The scenario.
+            charges: The charges.
+            seeds: Seeds of their blasts (charges, realisations); without noise they have no effect.
+        """
+        if seeds is None:
+            seeds = np.zeros((len(charges), self.realisations), dtype=np.int64)
+        threats = tuple(
+            LoadCase(charge, seed)
+            for of_realisation in seeds.T.tolist()
+            for charge, seed in zip(charges, of_realisation, strict=True)
+        )
+        return LoadCaseSet(scenario, threats, self.realisations, self.risk)
+
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
@@ -126,6 +148,7 @@ class _Shown:
     observation: EpisodeObservation
     actions: NumberedActions
     charges: tuple[AnyCharge, ...]
+    case: LoadCaseSet | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +213,8 @@ class _Site:
         among = bool(task.source.representative.vehicles)
         observable = Observable(self.empty.scenario, sources, among)
         observation = task.observation.episode(observable)
-        made = _Shown(observable, observation, self.actions.with_sources(sources), charges)
+        case = None if task.engine.has_noise else task.case(self.empty.scenario, charges)
+        made = _Shown(observable, observation, self.actions.with_sources(sources), charges, case)
         if isinstance(observation, BatchedObservation):  # others may keep a state
             _keep(self.shown, charges, made)
         return made
@@ -248,14 +272,9 @@ class Episode:
     @cached_property
     def case(self) -> LoadCaseSet:
         """The scenario and the threats, and how their loads combine into one number."""
-        of_charges = list(zip(self.shown.charges, self.seeds.tolist(), strict=True))
-        threats = tuple(
-            LoadCase(charge, seeds[number])
-            for number in range(self.task.realisations)
-            for charge, seeds in of_charges
-        )
-        scenario = self.site.empty.scenario
-        return LoadCaseSet(scenario, threats, self.task.realisations, self.task.risk)
+        if self.shown.case is not None:
+            return self.shown.case
+        return self.task.case(self.site.empty.scenario, self.shown.charges, self.seeds)
 
     @property
     def loads_key(self) -> tuple[Any, ...]:

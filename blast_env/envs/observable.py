@@ -1,7 +1,7 @@
 """The observable part of an episode, and the parts common to all observations."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final, Protocol
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
-from blast_env.layout.batch import Placements
+from blast_env.layout.batch import PlacementRules, Placements
 from blast_env.layout.build_site import vehicle_reach, worst_places
 from blast_env.site import (
     AnySource,
@@ -166,11 +166,24 @@ def stock_shares(placements: Placements) -> FloatArray:
     They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
     and the share of the budget (1 without a budget).
     """
-    left, zones = placements.left[:, 0], [each.zone for each in placements.rules]
-    budgets = np.array([np.nan if each.budget is None else each.budget for each in zones])
-    of_budget = np.where(np.isnan(budgets), 1.0, placements.budget_left / budgets)
-    stocks = np.array([each.stock for each in zones])
-    return np.stack((left / stocks, np.minimum(left / FULL_STOCK, 1.0), of_budget), axis=1)
+    left = placements.left[:, 0]
+    zones = _of_rules(placements, lambda each: (each.zone.budget or np.nan, each.zone.stock))
+    of_budget = np.where(np.isnan(zones[:, 0]), 1.0, placements.budget_left / zones[:, 0])
+    return np.stack((left / zones[:, 1], np.minimum(left / FULL_STOCK, 1.0), of_budget), axis=1)
+
+
+def _of_rules(
+    placements: Placements, values: Callable[[PlacementRules], Sequence[float]]
+) -> FloatArray:
+    """Return values of the rules of each placement, found once for each rules (placements, n)."""
+    rules = placements.rules
+    distinct = {id(each): each for each in rules}
+    known = np.array([values(each) for each in distinct.values()], dtype=np.float64)
+    if len(distinct) == 1:
+        return np.broadcast_to(known, (len(rules), known.shape[1]))
+    numbers = {key: number for number, key in enumerate(distinct)}
+    found: FloatArray = known[[numbers[id(each)] for each in rules]]
+    return found
 
 
 def cost_shares(scenario: Scenario) -> FloatArray:
@@ -197,6 +210,16 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
     return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
 
 
+def variant_values(zone: BuildZone) -> Plane:
+    """Return height and whether vehicles are stopped by the variant on a cell (2, variants + 1).
+
+    Variants count from 1, and nothing is 0.
+    """
+    variants = zone.catalogue.variants
+    rows = [(height_share(each.height_m), each.stops_vehicles) for each in variants]
+    return np.array([(0.0, 0.0), *rows], dtype=np.float32).T.copy()
+
+
 def items_placed(placements: Placements) -> Plane:
     """Return the values of the cells that change with the layouts of pieces.
 
@@ -211,9 +234,7 @@ def items_placed(placements: Placements) -> Plane:
     for index, each in enumerate(placements.rules):
         of_catalogues.setdefault(id(each.catalogue), []).append(index)
     for own in of_catalogues.values():
-        variants = placements.rules[own[0]].catalogue.variants
-        rows = [(height_share(each.height_m), each.stops_vehicles) for each in variants]
-        tables = np.array([(0.0, 0.0), *rows], dtype=np.float32).T.copy()
+        tables = variant_values(placements.rules[own[0]].zone)
         which: slice | list[int] = slice(None) if len(own) == len(legal) else own
         for plane, table in enumerate(tables):
             on_cells[which, plane] = table.take(placements.standing[which], mode="clip")
@@ -222,7 +243,7 @@ def items_placed(placements: Placements) -> Plane:
 
 def items_left(placements: Placements) -> FloatArray:
     """Return the remaining share of the pieces of each item (placements, items)."""
-    stocks = np.array([each.catalogue.stocks for each in placements.rules])
+    stocks = _of_rules(placements, lambda each: each.catalogue.stocks)
     left = np.minimum(placements.left[:, 1:], placements.left[:, :1])
     shares: FloatArray = left / np.maximum(stocks, 1)
     return shares

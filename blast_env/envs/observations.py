@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
+from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.envs.observable import (
     Array,
     BatchedObservation,
@@ -18,14 +19,13 @@ from blast_env.envs.observable import (
     Observation,
     Plane,
     VehicleView,
-    cells_shown,
     charge_share,
     cost_shares,
     height_share,
     item_values,
     items_left,
-    items_placed,
     stock_shares,
+    variant_values,
 )
 from blast_env.envs.planes import GridObservation, ImageEpisode, ImageObservation
 from blast_env.errors import BlastEnvError
@@ -39,8 +39,10 @@ from blast_env.site.zone import source_bounds_m
 MOST_STRUCTURES: Final = 8
 """Most structures that fit the vector."""
 
-_BESIDES_PLACES: Final = 3 + 6 + 2
+_SHARES: Final = 3
+_BESIDES_PLACES: Final = _SHARES + 6 + 2
 _FIXED: Final = _BESIDES_PLACES + MOST_STRUCTURES * 6
+_SITE: Final = _FIXED - _SHARES
 
 
 @dataclass(frozen=True)
@@ -101,10 +103,10 @@ class FeaturesObservation:
         charge = _charge_and_corner(scenario, observable.sources)
         site = (charge, structures[:, :-1].ravel())
         items = (structures[:, -1], *item_values(zone)) if zone.items else ()
+        constants = np.concatenate((*site, cost_shares(scenario).ravel(), *items))
         return FeaturesEpisode(
-            np.concatenate(site),
-            cost_shares(scenario),
-            np.concatenate((*items, [])),
+            np.clip(constants, 0.0, 1.0).astype(np.float32),
+            variant_values(zone),
             VehicleView.of(scenario, observable.sources),
             observable.shows_vehicles,
         )
@@ -115,53 +117,107 @@ class FeaturesEpisode(BatchedObservation):
     """The vector of one episode.
 
     Attributes:
-        site: Values of charge, corner of the build zone and structures (56,).
-        costs: Costs of the cells (rows, columns).
-        items: Heights of structures and items and costs of items; empty without a catalogue.
+        constants: Values that no layout changes: charge, corner and structures (56,), costs of
+            cells (cells,) and, with a catalogue, heights of structures, heights and costs of items.
+        variants: Values of cells by the variant on them; see `variant_values`.
         vehicles: The observable vehicles.
         shows_vehicles: Whether the stand-off is the last value; 1 without a vehicle.
     """
 
-    site: FloatArray
-    costs: FloatArray
-    items: FloatArray
+    constants: Plane
+    variants: Plane
     vehicles: VehicleView
     shows_vehicles: bool
 
     @staticmethod
     def observe_many(episodes: Sequence["FeaturesEpisode"], placements: Placements) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
-        parts: list[NDArray[Any]] = [stock_shares(placements)]
-        parts.append(_of_each(episodes, [each.site for each in episodes]))
-        parts.append(cells_shown(placements))
-        parts.append(_of_each(episodes, [each.costs for each in episodes]))
-        parts.append(_of_each(episodes, [each.items for each in episodes]))
-        if placements.rules[0].catalogue.has_items:
-            parts += [items_left(placements), items_placed(placements)]
-        if episodes[0].shows_vehicles:
-            parts.append(_stand_offs([each.vehicles for each in episodes], placements))
-        return _joined(parts)
+        shares, has_items = stock_shares(placements), placements.rules[0].catalogue.has_items
+        if has_items:
+            shares = np.hstack((shares, items_left(placements)))
+        numbers = {id(each): number for number, each in enumerate(episodes)}
+        distinct = {number: position for position, number in enumerate(numbers.values())}
+        own = np.array([distinct[numbers[id(each)]] for each in episodes])
+        constants, variants = (
+            np.array([getattr(episodes[number], name) for number in distinct])
+            for name in ("constants", "variants")
+        )
+        _, kinds, rows, columns = placements.legal.shape
+        legal = placements.legal.reshape(-1, kinds, rows * columns)
+        standing = placements.standing.reshape(-1, rows * columns)
+        length = shares.shape[1] + constants.shape[1] + 2 * rows * columns
+        if has_items:
+            length += (2 + kinds) * rows * columns
+        shows_vehicles = episodes[0].shows_vehicles
+        vectors = np.empty((len(episodes), length + shows_vehicles), dtype=np.float32)
+        _put_vectors(own, constants, variants, shares, legal, standing, has_items, vectors)
+        if shows_vehicles:
+            stand_offs = _stand_offs([each.vehicles for each in episodes], placements)
+            vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
+        return vectors
 
 
-def _of_each(episodes: Sequence[object], values: Sequence[FloatArray]) -> FloatArray:
-    """Return constant values of episodes (episodes, ...)."""
-    if all(each is episodes[0] for each in episodes):
-        return np.broadcast_to(values[0], (len(values), *values[0].shape))
-    return np.array(values)
+@njit(cache=True, nogil=True)
+def _put_vectors(
+    own: IntArray,
+    constants: Plane,
+    variants: Plane,
+    shares: FloatArray,
+    legal: BoolArray,
+    standing: NDArray[np.uint8],
+    has_items: bool,  # Numba has no keywords only
+    vectors: Plane,
+) -> None:
+    """Put the values of episodes into their vectors, all but the stand-off.
+
+    Args:
+        own: Number of the constants of each episode (episodes,).
+        constants: See `FeaturesEpisode` (numbers, n).
+        variants: See `FeaturesEpisode` (numbers, 2, variants + 1).
+        shares: Shares of stock, budget and items (episodes, 3 + items).
+        legal: Whether each variant may be placed (episodes, variants, cells).
+        standing: Number of the variant on each cell (episodes, cells).
+        has_items: Whether there is a catalogue.
+        vectors: The vectors (episodes, features).
+    """
+    _, kinds, cells = legal.shape
+    items = shares.shape[1] - _SHARES
+    for episode in range(len(vectors)):
+        vector, known = vectors[episode], constants[own[episode]]
+        for each in range(_SHARES):
+            vector[each] = min(max(shares[episode, each], 0.0), 1.0)
+        at = _SHARES
+        vector[at : at + _SITE] = known[:_SITE]
+        at += _SITE
+        for cell in range(cells):
+            vector[at + cell] = standing[episode, cell] > 0
+            is_free = legal[episode, 0, cell]
+            for kind in range(1, kinds):
+                is_free |= legal[episode, kind, cell]
+            vector[at + cells + cell] = is_free
+        at += 2 * cells
+        vector[at : at + len(known) - _SITE] = known[_SITE:]
+        at += len(known) - _SITE
+        if has_items:
+            for each in range(items):
+                vector[at + each] = min(max(shares[episode, _SHARES + each], 0.0), 1.0)
+            at += items
+            of_variants = variants[own[episode]]
+            for cell in range(cells):
+                number = standing[episode, cell]
+                vector[at + cell] = of_variants[0, number]
+                vector[at + cells + cell] = of_variants[1, number]
+            at += 2 * cells
+            for kind in range(kinds):
+                for cell in range(cells):
+                    vector[at + cell] = legal[episode, kind, cell]
+                at += cells
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:
     """Return values of several episodes (episodes, ...) as vectors (episodes, n), from 0 to 1."""
-    counts = [each[0].size for each in parts]
-    joined: Plane = np.empty((len(parts[0]), sum(counts)), dtype=np.float32)
-    first = 0
-    for each, count in zip(parts, counts, strict=True):
-        own = joined[:, first : first + count]
-        own[...] = each.reshape(len(each), -1)
-        if each.dtype == np.float64:  # other values are truths and shares
-            np.clip(own, 0.0, 1.0, out=own)
-        first += count
-    return joined
+    vectors = [each.reshape(len(each), -1) for each in parts]
+    return np.clip(np.hstack(vectors), 0.0, 1.0).astype(np.float32)
 
 
 def _structures(scenario: Scenario) -> FloatArray:

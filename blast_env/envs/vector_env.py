@@ -154,7 +154,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         terminated[played] = [self._running[index].ended for index in played]
         for index in _indices(terminated):
-            self._note(index, self._running[index].outcome)
+            self._note([index], self._running[index].outcome)
         self._steps[played] += 1
         truncated = self._steps >= self._most_steps
         truncated[begun] = False
@@ -208,18 +208,26 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         rngs = [rng for index in chosen if (rng := self._rngs[index]) is not None]
         self.episodes.begin(chosen, rngs, options)
         self._steps[chosen] = 0
+        of_outcomes: dict[int, tuple[Mapping[str, Any], list[int]]] = {}
         for index in chosen:
             episode = self._running[index]
-            self._note(index, episode.constants)
-            self._note(index, episode.outcome)
+            self._note([index], episode.constants)
+            outcome = episode.outcome  # one object for all with as many charges on a site
+            of_outcomes.setdefault(id(outcome), (outcome, []))[1].append(index)
+        for outcome, own in of_outcomes.values():
+            self._note(own, outcome)
 
-    def _note(self, index: int, values: Mapping[str, Any]) -> None:
-        """Note values of the information of an environment until others take their place."""
+    def _note(self, indices: list[int], values: Mapping[str, Any]) -> None:
+        """Note values of the information of environments until others take their place."""
         for name, value in values.items():
             noted = self._noted.get(name)
             if noted is None:
                 noted = self._noted[name] = _like(value, self.num_envs)
-            noted[index] = value
+            if noted.dtype == object or len(indices) == 1:
+                for index in indices:
+                    noted[index] = value
+            else:
+                noted[indices] = value
 
     def _begin_again(self, over: Sequence[int]) -> dict[str, Any]:
         """Begin episodes where others have ended; return the last observation and information."""

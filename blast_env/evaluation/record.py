@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class StructureLoad:
     """The load on one structure.
 
@@ -99,6 +99,8 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
     Impulses are means over the area of the counted walls. Where the engine has no areas, the
     weights of the structures replace them.
     """
+    if all(each.building == each.name for each in loads):  # the usual case
+        return tuple(loads)
     parts: dict[str, list[StructureLoad]] = {}
     for load in loads:
         parts.setdefault(load.building, []).append(load)

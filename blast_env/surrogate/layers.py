@@ -121,7 +121,15 @@ def _take(rows: Any, first: int, given: Any) -> None:
             put(given, number * inputs + each, rows[row, each])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+def buffers(*widths: int) -> tuple[SingleArray, ...]:
+    """Return room for four rows of each width.
+
+    Compiled code that makes an array itself frees it after its last mention, which is where its
+    place in memory is asked for.
+    """
+    return tuple([np.empty((ROWS_AT_ONCE, width), dtype=np.float32) for width in widths])
+
+
 def two_layers(
     rows: SingleArray,
     first: SingleArray,
@@ -138,12 +146,28 @@ def two_layers(
         second: Weights of the second layer (members, width, outputs).
         second_bias: Its biases (members, outputs).
     """
+    layers = first, first_bias, second, second_bias
+    given, middle, last = buffers(rows.shape[2], *second.shape[1:])
+    found = np.empty((len(second), rows.shape[1], second.shape[2]), dtype=np.float32)
+    _put_two_layers(rows, *layers, given, middle, last, found)
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+def _put_two_layers(
+    rows: Any,
+    first: Any,
+    first_bias: Any,
+    second: Any,
+    second_bias: Any,
+    given: Any,
+    middle: Any,
+    last: Any,
+    found: Any,
+) -> None:
+    """Find the outputs of two layers; see `two_layers`."""
     members, width, outputs = second.shape
     count, inputs = rows.shape[1:]
-    found = np.empty((members, count, outputs), dtype=np.float32)
-    given = np.empty(ROWS_AT_ONCE * inputs, dtype=np.float32)
-    middle = np.empty(ROWS_AT_ONCE * width, dtype=np.float32)
-    last = np.empty((ROWS_AT_ONCE, outputs), dtype=np.float32)
     at, between, end = place(given), place(middle), place(last)
     same = 0, 0, 0, 0
     for member in range(members):
@@ -157,7 +181,6 @@ def two_layers(
             for number in range(min(ROWS_AT_ONCE, count - row)):
                 for each in range(outputs):
                     found[member, row + number, each] = last[number, each]
-    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)

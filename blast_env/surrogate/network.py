@@ -209,7 +209,7 @@ class Networks:
             np.stack(arrays) if members else np.empty((0, *shape))
             for arrays, shape in zip_longest(zip(*members, strict=True), SHAPES)
         ]
-        single = [each.astype(np.float32) for each in stacked]
+        single = [np.ascontiguousarray(each, dtype=np.float32) for each in stacked]
         self._layers = Member(*single)
 
     def messages(self, scaled: FloatArray) -> SingleArray:

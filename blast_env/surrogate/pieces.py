@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.gas.simd import place
 from blast_env.gas.state import FUSED
-from blast_env.surrogate.layers import ROWS_AT_ONCE, SingleArray, four_rows, four_sums
+from blast_env.surrogate.layers import ROWS_AT_ONCE, SingleArray, buffers, four_rows, four_sums
 from blast_env.surrogate.ways import FALLS_M, SHARES, STATIONS, Ways
 
 Box = tuple[float, ...]
@@ -111,7 +111,11 @@ class KnownPieces:
         weights = self._ways.weights
         by_place = weights.reshape(len(weights), -1, *weights.shape[3:])
         known = self._stopped, self._is_open, by_place, self._messages[networks]
-        found: SingleArray = _differs(layouts, *known, *self._bounds, *self._layers[networks])
+        layers = self._layers[networks]
+        members, points, width = layers.base.shape
+        found = np.empty((members, len(layouts) * points), dtype=np.float32)
+        room = buffers(layers.first.shape[1], width, width)
+        _put_differs(layouts, *known, *self._bounds, *layers, *room, found)
         return found
 
     def _meet(self, boxes: Sequence[Box]) -> None:
@@ -173,7 +177,7 @@ def _put_shares(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
-def _differs(
+def _put_differs(
     layouts: Any,
     stopped: Any,
     is_open: Any,
@@ -188,15 +192,15 @@ def _differs(
     second_bias: Any,
     last: Any,
     last_bias: Any,
-) -> Any:
-    """Return the predictions at the points behind each layout; see `KnownPieces.differs`."""
+    given: Any,
+    middle: Any,
+    end: Any,
+    found: Any,
+) -> None:
+    """Find the predictions at the points behind each layout; see `KnownPieces.differs`."""
     members, points, width = base.shape
     inputs, length = first.shape[1], messages.shape[3]
-    found = np.empty((members, len(layouts) * points), dtype=np.float32)
     shares = np.empty((points, SHARES), dtype=np.float32)
-    given = np.empty((ROWS_AT_ONCE, inputs), dtype=np.float32)
-    middle = np.empty(ROWS_AT_ONCE * width, dtype=np.float32)
-    end = np.empty(ROWS_AT_ONCE * width, dtype=np.float32)
     at, between, beyond = place(given), place(middle), place(end)
     same = 0, 0, 0, 0
     for layout in range(len(layouts)):
@@ -225,7 +229,6 @@ def _differs(
                 sums = four_sums(beyond, width, to_last, last_bias[member])
                 for number in range(min(ROWS_AT_ONCE, points - point)):
                     found[member, layout * points + point + number] = sums[number]
-    return found
 
 
 class Memory:
