@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.envs.observable import (
     Array,
     BatchedObservation,
@@ -143,7 +143,7 @@ class FeaturesEpisode(BatchedObservation):
             for name in ("constants", "variants")
         )
         _, kinds, rows, columns = placements.legal.shape
-        legal = placements.legal.reshape(-1, kinds, rows * columns)
+        legal = placements.legal.view(np.uint8).reshape(-1, kinds, rows * columns)
         standing = placements.standing.reshape(-1, rows * columns)
         length = shares.shape[1] + constants.shape[1] + 2 * rows * columns
         if has_items:
@@ -163,7 +163,7 @@ def _put_vectors(
     constants: Plane,
     variants: Plane,
     shares: FloatArray,
-    legal: BoolArray,
+    legal: NDArray[np.uint8],
     standing: NDArray[np.uint8],
     has_items: bool,  # Numba has no keywords only
     vectors: Plane,
@@ -175,7 +175,7 @@ def _put_vectors(
         constants: See `FeaturesEpisode` (numbers, n).
         variants: See `FeaturesEpisode` (numbers, 2, variants + 1).
         shares: Shares of stock, budget and items (episodes, 3 + items).
-        legal: Whether each variant may be placed (episodes, variants, cells).
+        legal: 1 where each variant may be placed (episodes, variants, cells).
         standing: Number of the variant on each cell (episodes, cells).
         has_items: Whether there is a catalogue.
         vectors: The vectors (episodes, features).
@@ -189,12 +189,13 @@ def _put_vectors(
         at = _SHARES
         vector[at : at + _SITE] = known[:_SITE]
         at += _SITE
+        stands, is_free = vector[at : at + cells], vector[at + cells : at + 2 * cells]
         for cell in range(cells):
-            vector[at + cell] = standing[episode, cell] > 0
-            is_free = legal[episode, 0, cell]
-            for kind in range(1, kinds):
-                is_free |= legal[episode, kind, cell]
-            vector[at + cells + cell] = is_free
+            stands[cell] = min(standing[episode, cell], 1)
+            is_free[cell] = legal[episode, 0, cell]
+        for kind in range(1, kinds):
+            for cell in range(cells):
+                is_free[cell] = max(is_free[cell], np.float32(legal[episode, kind, cell]))
         at += 2 * cells
         vector[at : at + len(known) - _SITE] = known[_SITE:]
         at += len(known) - _SITE
@@ -202,15 +203,16 @@ def _put_vectors(
             for each in range(items):
                 vector[at + each] = min(max(shares[episode, _SHARES + each], 0.0), 1.0)
             at += items
+            heights, stops = vector[at : at + cells], vector[at + cells : at + 2 * cells]
             of_variants = variants[own[episode]]
             for cell in range(cells):
-                number = standing[episode, cell]
-                vector[at + cell] = of_variants[0, number]
-                vector[at + cells + cell] = of_variants[1, number]
+                heights[cell] = of_variants[0, standing[episode, cell]]
+                stops[cell] = of_variants[1, standing[episode, cell]]
             at += 2 * cells
             for kind in range(kinds):
+                places = vector[at : at + cells]
                 for cell in range(cells):
-                    vector[at + cell] = legal[episode, kind, cell]
+                    places[cell] = legal[episode, kind, cell]
                 at += cells
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -220,7 +221,7 @@ class LoadCaseSet:
             if both:
                 raise BlastEnvError(f"a search may not use {both.pop()}: layouts are judged on it")
 
-    @property
+    @cached_property
     def charges(self) -> tuple[AnyCharge, ...]:
         """The charges of one realisation; a charge that was drawn twice is included twice."""
         count = max(len(self.threats) // self.realisations, 1)
@@ -234,7 +235,11 @@ class LoadCaseSet:
     @property
     def is_mean(self) -> bool:
         """Whether the risk measure is the mean over the charges."""
-        return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
+        return isinstance(self._risk, MeanRisk)
+
+    @cached_property
+    def _risk(self) -> Risk:
+        return self.risk or self.scenario.objective.risk
 
     def combined(self, loads: Sequence[float] | FloatArray) -> float:
         """Combine loads into one: the mean per charge, then the risk measure over the charges.
@@ -242,7 +247,7 @@ class LoadCaseSet:
         Args:
             loads: One per threat, in their order; all, or only the first ones, at least one.
         """
-        risk = self.risk or self.scenario.objective.risk
+        risk = self._risk
         if len(loads) == 1 and isinstance(risk, MeanRisk | WorstRisk):
             return float(loads[0])
         values = np.asarray(loads, dtype=np.float64)

@@ -405,12 +405,12 @@ class Assessment:
         combined, counts = case.combined, case.scenario.objective
         sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
         return cls(
-            impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
-            impulse_sim=combined(sums) if len(sums) == len(loads) else None,
-            peak_pa=combined([each.protected_peak_pa for each in loads]),
-            load=case.objective_value([each.load(counts) for each in loads], layout),
-            level=min(each.level for each in loads) if counts.kind == "response" else None,
-            in_range=all(each.in_range for each in loads),
+            combined([each.protected_impulse_pa_s for each in loads]),
+            combined(sums) if len(sums) == len(loads) else None,
+            combined([each.protected_peak_pa for each in loads]),
+            case.objective_value([each.load(counts) for each in loads], layout),
+            all(each.in_range for each in loads),
+            min([each.level for each in loads]) if counts.kind == "response" else None,
         )
 
     @property

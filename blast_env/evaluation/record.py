@@ -217,7 +217,7 @@ class BlastLoads:
     @property
     def protected_impulse_pa_s(self) -> float:
         """Weighted sum of the impulses of the protected buildings, Pa*s."""
-        return sum(each.weight * each.impulse_pa_s for each in self._buildings)
+        return sum([each.weight * each.impulse_pa_s for each in self._buildings])
 
     @property
     def protected_impulse_sim(self) -> float | None:
@@ -232,20 +232,22 @@ class BlastLoads:
     def protected_peak_pa(self) -> float:
         """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
         peaks = [load.peak_pa for load in self.protected]
-        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
+        return max([np.nan if peak is None else peak for peak in peaks], default=0.0)
 
     def load(self, objective: ObjectiveSection) -> float:
         """Return the load of the protected structures that an objective selects, in its unit."""
         impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
         return sum(
-            objective.load(
-                impulse_pa_s[load.building],
-                load.peak_pa or 0.0,
-                load.weight,
-                load.peak_weight,
-                load.response,
-            )
-            for load in self.protected
+            [
+                objective.load(
+                    impulse_pa_s[load.building],
+                    load.peak_pa or 0.0,
+                    load.weight,
+                    load.peak_weight,
+                    load.response,
+                )
+                for load in self.protected
+            ]
         )
 
     @property

@@ -4,6 +4,7 @@ All lengths are in metres, x to the right and y upwards from the lower left corn
 heights are above the ground.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Final, Self
@@ -15,7 +16,6 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
 from blast_env.hashing import Hashed, digest_of, fields_with, hashed_content
@@ -343,18 +343,18 @@ class Scenario(Content):
     def sample_charge(self, rng: np.random.Generator) -> AnyCharge:
         """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst place."""
         # Drawn also for a single source, so that adding one does not shift the stream.
-        chosen = int(self._charge_shares.searchsorted(rng.random(), side="right"))
+        chosen = bisect_right(self._charge_shares, rng.random())
         source = self.charge[chosen]
         if isinstance(source, VehicleSource):
             return VehicleCharge(source)
         return Charge(source.sample_position_m(rng), source.tnt_kg, source.height_m)
 
     @cached_property
-    def _charge_shares(self) -> FloatArray:
+    def _charge_shares(self) -> list[float]:
         """Cumulative probabilities of the sources, as by `Generator.choice` (sources,)."""
         weights = np.array([source.weight for source in self.charge])
         sums = (weights / weights.sum()).cumsum()
-        shares: FloatArray = sums / sums[-1]
+        shares: list[float] = (sums / sums[-1]).tolist()
         return shares
 
     @model_validator(mode="after")
