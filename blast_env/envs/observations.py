@@ -219,7 +219,8 @@ def _put_vectors(
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:
     """Return values of several episodes (episodes, ...) as vectors (episodes, n), from 0 to 1."""
     vectors = [each.reshape(len(each), -1) for each in parts]
-    return np.clip(np.hstack(vectors), 0.0, 1.0).astype(np.float32)
+    joined: Plane = np.clip(np.hstack(vectors), 0.0, 1.0).astype(np.float32)
+    return joined
 
 
 def _structures(scenario: Scenario) -> FloatArray:

@@ -240,7 +240,8 @@ class Networks:
         second = two_layers(
             both, layers.first, layers.first_bias, layers.second, layers.second_bias
         )
-        return np.einsum("mpi,mi->mp", second, layers.last[..., 0]) + layers.last_bias
+        found: FloatArray = np.einsum("mpi,mi->mp", second, layers.last[..., 0])
+        return found + layers.last_bias
 
     def at_points(self, scaled: FloatArray, heard: SingleArray) -> PointLayers:
         """Return the layers for points whose open shares and further messages are yet unknown.

@@ -108,14 +108,20 @@ class KnownPieces:
             layouts: See `numbers_of`.
             networks: Number of the set of networks.
         """
-        weights = self._ways.weights
-        by_place = weights.reshape(len(weights), -1, *weights.shape[3:])
-        known = self._stopped, self._is_open, by_place, self._messages[networks]
-        layers = self._layers[networks]
+        weights, layers = self._ways.weights, self._layers[networks]
         members, points, width = layers.base.shape
         found = np.empty((members, len(layouts) * points), dtype=np.float32)
-        room = buffers(layers.first.shape[1], width, width)
-        _put_differs(layouts, *known, *self._bounds, *layers, *room, found)
+        arguments: tuple[Any, ...] = (
+            *(
+                layouts,
+                self._stopped,
+                self._is_open,
+                weights.reshape(points, -1, *weights.shape[3:]),
+            ),
+            *(self._messages[networks], *self._bounds, *layers),
+            *(*buffers(layers.first.shape[1], width, width), found),
+        )
+        _put_differs(*arguments)
         return found
 
     def _meet(self, boxes: Sequence[Box]) -> None:
