@@ -59,25 +59,22 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
         places_m: Possible places of its charge, at least one (places, 2).
         walls: The loaded walls of protected structures.
     """
-    stand_offs_m = least_distances_m(walls, places_m)
-    left = np.ones(len(places_m), dtype=bool)
-    chosen: list[PointM] = []
-    distances_m: list[float] = []
-    while left.any() and len(chosen) < source.places:
-        near = np.flatnonzero(left & (stand_offs_m <= stand_offs_m[left].min() + _EQUAL_M))
-        middle_m = _from_middle_m(walls, places_m[near], stand_offs_m[near])
-        best = np.arange(len(near))  # ordered by y, then by x
-        for measure in (middle_m, *places_m[near].T):
-            values = measure[best]
-            best = best[values <= values.min() + _EQUAL_M]
-        worst = near[best[0]]
-        x_m, y_m = places_m[worst].tolist()
-        chosen.append((x_m, y_m))
-        distances_m.append(float(stand_offs_m[worst]))
-        if len(chosen) < source.places:
-            apart_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
-            left &= apart_m >= source.least_apart_m - _EQUAL_M
-    return WorstPlaces(source, tuple(chosen), tuple(distances_m))
+    from blast_env.vehicles.worst_kernels import chosen_places  # Numba takes long to import
+
+    distances_m = np.array([_distances_m(wall, places_m) for wall in walls])
+    distances_m = distances_m.reshape(len(walls), len(places_m))
+    middles_m = [(wall.bounds_m if isinstance(wall, WallLine) else wall).centre for wall in walls]
+    chosen = chosen_places(
+        np.ascontiguousarray(places_m),
+        distances_m,
+        np.array(middles_m).reshape(-1, 2),
+        source.places,
+        source.least_apart_m,
+        _EQUAL_M,
+    )
+    of_chosen_m = distances_m[:, chosen].min(axis=0, initial=np.inf)
+    places = tuple((x_m, y_m) for x_m, y_m in places_m[chosen].tolist())
+    return WorstPlaces(source, places, tuple(of_chosen_m.tolist()))
 
 
 def stand_off_m(walls: Iterable[Wall], position_m: PointM) -> float:
@@ -91,19 +88,6 @@ def least_distances_m(walls: Iterable[Wall], places_m: FloatArray) -> FloatArray
     for wall in walls:
         np.minimum(nearest_m, _distances_m(wall, places_m), out=nearest_m)
     return nearest_m
-
-
-def _from_middle_m(
-    walls: Iterable[Wall], places_m: FloatArray, nearest_m: FloatArray
-) -> FloatArray:
-    """Return the distance of places from the middle of the nearest loaded wall, m (places,)."""
-    middle_m = np.full(len(places_m), np.inf)
-    for wall in walls:
-        x_m, y_m = (wall.bounds_m if isinstance(wall, WallLine) else wall).centre
-        aside_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
-        is_nearest = _distances_m(wall, places_m) <= nearest_m + _EQUAL_M
-        np.minimum(middle_m, aside_m, out=middle_m, where=is_nearest)
-    return middle_m
 
 
 def nearest_point_m(walls: Iterable[Wall], position_m: PointM) -> PointM:
