@@ -202,86 +202,32 @@ class ReachQuery:
 
     def answer(self) -> Reach:
         """Compute the reach of the vehicle."""
-        from scipy.ndimage import label  # takes a third of a second to import
+        from blast_env.vehicles.reach_kernels import (  # Numba takes long to import
+            plane_of,
+            reached_parts,
+        )
 
-        plane = _Plane.of(self)
-        closed = plane.covering(self.closed_m)
-        start = np.zeros_like(closed)
-        for strip_m in self.entries_m:
-            start[plane.start(strip_m)] = True
-        start &= ~closed
-        # Corners connect along edges, and edges along rectangles, so parts connect side by side
-        # and never diagonally.
-        labels, count = label(~closed)
-        connected = np.zeros(count + 1, dtype=bool)
-        connected[labels[start]] = True
+        half = steps_of(self.width_m) // 2
+        closed, solid = _grown(self.closed_m, half), _grown(self.solid_m, half)
+        starts = _grown(self.entries_m, -half)
+        boxes = np.concatenate((closed, solid, starts))
+        # The places nearest to a structure touch it, or are level with its corners.
+        level = _grown(self.level_m, 0)
+        ends = steps_of(self.site.width_m), steps_of(self.site.height_m)
+        (x, lattice_x), (y, lattice_y) = (
+            plane_of(boxes, level, half, end, _step(end), axis) for axis, end in enumerate(ends)
+        )
+        start, reached, clear = reached_parts(x, y, closed, solid, starts)
         return Reach(
             width_m=self.width_m,
-            x_m=plane.x / _PER_M,
-            y_m=plane.y / _PER_M,
+            x_m=x / _PER_M,
+            y_m=y / _PER_M,
             start=start,
-            reached=connected[labels],
-            clear=~plane.covering(self.solid_m),
-            lattice_x_m=plane.lattice_x / _PER_M,
-            lattice_y_m=plane.lattice_y / _PER_M,
+            reached=reached,
+            clear=clear,
+            lattice_x_m=lattice_x / _PER_M,
+            lattice_y_m=lattice_y / _PER_M,
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Plane:
-    """The plane of the centres of a vehicle, cut by all obstacles, micrometres.
-
-    Attributes:
-        x: Cuts along x, rising; at the first and the last the vehicle touches the border.
-        y: Cuts along y.
-        lattice_x: x of the places of its charge, rising, cuts included.
-        lattice_y: The same along y.
-        half: Half of its width.
-    """
-
-    x: Steps
-    y: Steps
-    lattice_x: Steps
-    lattice_y: Steps
-    half: int
-
-    @classmethod
-    def of(cls, query: ReachQuery) -> "_Plane":
-        half = steps_of(query.width_m) // 2
-        boxes = np.concatenate(
-            (_grown((*query.closed_m, *query.solid_m), half), _grown(query.entries_m, -half))
-        )
-        # The places nearest to a structure touch it, or are level with its corners.
-        level = _grown(query.level_m, 0)
-        cuts, lattices = [], []
-        for axis, side_m in enumerate((query.site.width_m, query.site.height_m)):
-            end = steps_of(side_m)
-            last = max(end - half, half)
-            regular = np.arange(half, last + 1, _step(end), dtype=np.int64)
-            cut = _within(boxes[:, axis::2], half, last)
-            cuts.append(cut)
-            lattices.append(
-                np.unique(np.concatenate((cut, regular, _within(level[:, axis::2], half, last))))
-            )
-        return cls(cuts[0], cuts[1], lattices[0], lattices[1], half)
-
-    def covering(self, rectangles_m: Iterable[Rectangle]) -> BoolArray:
-        """Return whether the vehicle overlaps a rectangle at each part; touching does not count."""
-        covered = np.zeros((2 * len(self.y) - 1, 2 * len(self.x) - 1), dtype=bool)
-        left, bottom, right, top = _grown(rectangles_m, self.half).T
-        # The parts strictly between; a value that is not a cut lies beyond all of them.
-        low = np.maximum(2 * np.searchsorted(self.y, bottom, side="right") - 1, 0)
-        high = 2 * np.searchsorted(self.y, top, side="left")
-        first = np.maximum(2 * np.searchsorted(self.x, left, side="right") - 1, 0)
-        after = 2 * np.searchsorted(self.x, right, side="left")
-        for own in zip(*map(np.ndarray.tolist, (low, high, first, after)), strict=True):
-            covered[own[0] : own[1], own[2] : own[3]] = True
-        return covered
-
-    def start(self, strip_m: Rectangle) -> tuple[slice, slice]:
-        """Return the parts at which the vehicle stands within the strip behind an entry."""
-        ((left, bottom, right, top),) = _grown((strip_m,), -self.half)
-        return _from_to(self.y, bottom, top), _from_to(self.x, left, right)
 
 
 def steps_of(length_m: float) -> int:
@@ -297,19 +243,7 @@ def _grown(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
     return grown
 
 
-def _within(edges: Steps, first: int, last: int) -> Steps:
-    """Return the distinct edges between two ends, and the ends, rising."""
-    inside = edges[(edges > first) & (edges < last)]
-    return np.unique(np.append(inside, (first, last)))
-
-
 def _step(end: int) -> int:
     """Return the spacing of regular places of the charge on a side of the site, micrometres."""
     module = steps_of(MODULE_SIDE_M)
     return module * ceil(end / module / _MOST_STEPS)
-
-
-def _from_to(cuts: Steps, low: int, high: int) -> slice:
-    """Return the parts of an axis from one cut to another, both within the site."""
-    first, last = np.searchsorted(cuts, np.clip([low, high], cuts[0], cuts[-1]))
-    return slice(2 * int(first), 2 * int(last) + 1)

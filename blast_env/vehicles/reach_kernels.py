@@ -1,0 +1,119 @@
+"""The parts of a plane that a vehicle's centre can reach, in compiled code.
+
+The plane is cut at all edges of obstacles, grown by half of the vehicle's width. Its parts are the
+cuts and the spaces between, in turn, along both axes. All lengths are whole micrometres.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from blast_env.arrays import BoolArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def plane_of(boxes: IntArray, level: IntArray, half: int, end: int, step: int, axis: int) -> Any:
+    """Return the cuts along an axis, and the places of the charge, rising.
+
+    Args:
+        boxes: Grown obstacles and shrunk entries (boxes, 4).
+        level: Structures (structures, 4).
+        half: Half of the width of the vehicle.
+        end: Length of the site along the axis.
+        step: Spacing of regular places.
+        axis: 0 for x, 1 for y.
+    """
+    last = max(end - half, half)
+    cuts = _with_ends(boxes, axis, half, last)
+    regular = np.arange(half, last + 1, step)
+    beside = _with_ends(level, axis, half, last)
+    return cuts, np.unique(np.concatenate((cuts, regular, beside)))
+
+
+@njit(error_model="numpy")
+def _with_ends(boxes: IntArray, axis: int, first: int, last: int) -> IntArray:
+    """Return the distinct edges of boxes between two ends, and the ends, rising."""
+    found = np.empty(2 * len(boxes) + 2, dtype=np.int64)
+    found[0], found[1], count = first, last, 2
+    for box in range(len(boxes)):
+        for edge in (boxes[box, axis], boxes[box, axis + 2]):
+            if first < edge < last:
+                found[count] = edge
+                count += 1
+    return np.unique(found[:count])
+
+
+@njit(cache=True, nogil=True)
+def reached_parts(
+    x: IntArray, y: IntArray, closed: IntArray, solid: IntArray, starts: IntArray
+) -> Any:
+    """Return where the vehicle's centre starts, what it reaches, and where nothing is below it.
+
+    Corners connect along edges, and edges along rectangles, so parts connect side by side and
+    never diagonally.
+
+    Args:
+        x: Cuts along x.
+        y: Cuts along y.
+        closed: Grown obstacles that stop it (boxes, 4).
+        solid: Grown obstacles that it drives over (boxes, 4).
+        starts: The places of its centre behind each entry (entries, 4).
+
+    Returns:
+        Three masks of the parts (2 y - 1, 2 x - 1).
+    """
+    # 1. What is closed, and where it starts.
+    is_closed = _covered(x, y, closed)
+    start = np.zeros_like(is_closed)
+    for strip in range(len(starts)):
+        low, high = _from_to(y, starts[strip, 1], starts[strip, 3])
+        first, after = _from_to(x, starts[strip, 0], starts[strip, 2])
+        start[low:high, first:after] = True
+    start &= ~is_closed
+    # 2. From there to all parts beside that are not closed.
+    rows, columns = is_closed.shape
+    reached = start.copy()
+    waiting = np.empty((rows * columns, 2), dtype=np.int64)
+    count = 0
+    for row in range(rows):
+        for column in range(columns):
+            if start[row, column]:
+                waiting[count, 0], waiting[count, 1] = row, column
+                count += 1
+    while count:
+        count -= 1
+        row, column = waiting[count]
+        for up, right in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            other, beside = row + up, column + right
+            if not (0 <= other < rows and 0 <= beside < columns):
+                continue
+            if not is_closed[other, beside] and not reached[other, beside]:
+                reached[other, beside] = True
+                waiting[count, 0], waiting[count, 1] = other, beside
+                count += 1
+    return start, reached, ~_covered(x, y, solid)
+
+
+@njit(error_model="numpy")
+def _covered(x: IntArray, y: IntArray, boxes: IntArray) -> BoolArray:
+    """Return whether the vehicle overlaps a box at each part; touching does not count."""
+    covered = np.zeros((2 * len(y) - 1, 2 * len(x) - 1), dtype=np.bool_)
+    for box in range(len(boxes)):
+        left, bottom, right, top = boxes[box]
+        # The parts strictly between; a value that is not a cut lies beyond all of them.
+        low = max(2 * np.searchsorted(y, bottom, side="right") - 1, 0)
+        high = 2 * np.searchsorted(y, top, side="left")
+        first = max(2 * np.searchsorted(x, left, side="right") - 1, 0)
+        after = 2 * np.searchsorted(x, right, side="left")
+        if low < high and first < after:
+            covered[low:high, first:after] = True
+    return covered
+
+
+@njit(error_model="numpy")
+def _from_to(cuts: IntArray, low: int, high: int) -> Any:
+    """Return the parts of an axis from one cut to another, both within the site."""
+    first = np.searchsorted(cuts, min(max(low, cuts[0]), cuts[-1]))
+    last = np.searchsorted(cuts, min(max(high, cuts[0]), cuts[-1]))
+    return 2 * first, 2 * last + 1
