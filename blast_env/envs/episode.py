@@ -289,7 +289,7 @@ class Episode:
         charges = self.case.charges_against(self.transition.after)
         return _outcome(self.evaluator, *self.assess(), charges)
 
-    @property
+    @cached_property
     def constants(self) -> Mapping[str, Any]:
         """The information that does not change in the episode."""
         return {

@@ -175,12 +175,12 @@ def stock_shares(placements: Placements) -> FloatArray:
 def _of_rules(
     placements: Placements, values: Callable[[PlacementRules], Sequence[float]]
 ) -> FloatArray:
-    """Return values of the rules of each placement, found once for each rules (placements, n)."""
+    """Return values of the rules of each placement (placements, n), or of all if equal (1, n)."""
     rules = placements.rules
     distinct = {id(each): each for each in rules}
     known = np.array([values(each) for each in distinct.values()], dtype=np.float64)
     if len(distinct) == 1:
-        return np.broadcast_to(known, (len(rules), known.shape[1]))
+        return known
     numbers = {key: number for number, key in enumerate(distinct)}
     found: FloatArray = known[[numbers[id(each)] for each in rules]]
     return found

@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Final
@@ -150,7 +151,9 @@ class SurrogateEngine(Engine):
             of_sites.setdefault(each.scenario.content_hash, []).append(number)
         for numbers in of_sites.values():
             own = [blasts[number] for number in numbers]
-            with compilation_notice("the surrogate (some 10 s)"):
+            # The first site compiles everything; to listen takes longer than a prediction.
+            compiles = compilation_notice("the surrogate (some 10 s)")
+            with nullcontext() if self._sites else compiles:
                 served = self._site(own[0].scenario)
                 charges = [charge_against(*each[:3]) for each in own]
                 layouts = [each.layout for each in own]
