@@ -1,6 +1,7 @@
 """The content of a scenario file: all its sections, without the checks between them."""
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field, StrictInt
@@ -37,6 +38,10 @@ def _check_version(version: int) -> int:
     if version != SCHEMA_VERSION:
         raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
     return version
+
+
+_MOST_GROUNDS: Final = 64
+"""Most grounds of vehicles that a scenario keeps: a charge of another mass is another vehicle."""
 
 
 class Content(Section):
@@ -102,6 +107,21 @@ class Content(Section):
         self, source: VehicleSource, layout: Iterable[Element] = ()
     ) -> VehicleGround:
         """Return a vehicle's ground without barriers and the structures that a layout removes."""
+        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        key = source, away
+        if key not in self._grounds:
+            if len(self._grounds) >= _MOST_GROUNDS:
+                self._grounds.clear()
+            self._grounds[key] = self._ground_of(source, self.structures_with(layout))
+        return self._grounds[key]
+
+    @cached_property
+    def _grounds(self) -> dict[tuple[VehicleSource, frozenset[str]], VehicleGround]:
+        return {}
+
+    def _ground_of(
+        self, source: VehicleSource, structures: tuple[AnyStructure, ...]
+    ) -> VehicleGround:
         way = None if self.build_zone is None else self.build_zone.access_way
         closed: tuple[Rectangle, ...] = ()
         rated: tuple[RatedPiece, ...] = ()
@@ -111,7 +131,6 @@ class Content(Section):
                 closed = (where,)
             else:
                 rated = (RatedPiece(where, rating, "the gate"),)
-        structures = self.structures_with(layout)
         standing_m = tuple(box for s in structures if not s.lets_through for box in s.boxes_m)
         return VehicleGround(
             source,

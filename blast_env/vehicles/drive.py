@@ -17,7 +17,7 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import hypot
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -91,6 +91,19 @@ class VehicleGround:
     gates: tuple[Rectangle, ...] = ()
     rated_gates: tuple[RatedPiece, ...] = ()
     charge_radius_m: float = MODULE_SIDE_M
+
+    def __hash__(self) -> int:
+        """Return the hash of all attributes, computed once: caches ask for it at every layout."""
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without the hash, which is another one in each process."""
+        return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+    @cached_property
+    def _hash(self) -> int:
+        around = self.standing_m, self.walls, self.gates, self.rated_gates
+        return hash((self.source, self.site, around, self.charge_radius_m))
 
     @property
     def entries(self) -> tuple[tuple[Entry, WallName], ...]:
