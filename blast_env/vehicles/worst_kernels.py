@@ -42,7 +42,9 @@ def chosen_places(
             return chosen[:rank]
         # 2. Of these, the nearest to the middle of its nearest wall; then the leftmost; then the
         #    lowest.
-        for place in np.flatnonzero(best):
+        for place in range(count):
+            if not best[place]:
+                continue
             measure_m[place] = inf
             for wall in range(walls):
                 if distances_m[wall, place] <= nearest_m[place] + equal_m:
