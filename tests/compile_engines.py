@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from blast_env import load_scenario, simulate
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.gas import (
@@ -24,7 +25,7 @@ from blast_env.gas import (
 )
 from blast_env.layout import draw_charge
 from blast_env.site import Scenario
-from blast_env.surrogate import Ways, relations
+from blast_env.surrogate import SurrogateEngine, Ways, relations
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
@@ -54,16 +55,25 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
 
 
 def surrogate() -> None:
+    """And a batch of environments on it."""
     piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
     points = np.array([[9.0, 0.0, 1.0]])
     Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
     relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
+    envs = BlastBarrierVectorEnv(
+        2, scenario="control_room", engine=SurrogateEngine(), observation="features"
+    )
+    _, info = envs.reset(seed=0)
+    for _ in range(6):
+        *_, info = envs.step(info["action_mask"].argmax(axis=1))
 
 
 def driving() -> None:
     vehicle = Scenario.from_document(driven_document(), "driven")
     for source in vehicle.vehicles:
-        assert vehicle.vehicle_ground(source).drive().speeds is not None
+        ground = vehicle.vehicle_ground(source)
+        assert ground.drive().speeds is not None
+        assert ground.worst_places().places_m
 
 
 def response() -> None:

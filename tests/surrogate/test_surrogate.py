@@ -181,6 +181,43 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
         assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-5)
 
 
+def silu(values: np.ndarray) -> np.ndarray:
+    return values / (1.0 + np.exp(-values))
+
+
+@pytest.mark.parametrize("rows", [1, 3, 4, 150])
+def test_compiled_layers_are_those_of_the_formula(rows: int) -> None:
+    """In double precision, and whatever is beside a row; far from 0, too."""
+    rng = np.random.default_rng(rows)
+    members = [Member(*(rng.normal(0.0, 0.3, shape) for shape in SHAPES)) for _ in range(2)]
+    networks = Networks(members)
+    related, features = rng.normal(0.0, 3.0, (rows, 15)), rng.normal(0.0, 3.0, (rows, FEATURES))
+    heard = networks.messages(related)
+    for number, each in enumerate(members):
+        sent = silu(related @ each.send + each.send_bias)
+        said = silu(sent @ each.message + each.message_bias)
+        assert heard[number] == pytest.approx(said, abs=1e-4)
+        both = np.hstack((features, said))
+        first = silu(both @ each.first + each.first_bias)
+        second = silu(first @ each.second + each.second_bias)
+        differs = networks(features, heard)[number]
+        assert differs == pytest.approx((second @ each.last + each.last_bias)[:, 0], abs=1e-3)
+    assert (networks.messages(related[-1:])[:, 0] == heard[:, -1]).all()
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(boxes=BOXES)
+def test_several_pieces_stop_what_the_one_stops_that_stops_most(
+    boxes: list[tuple[float, float, float]],
+) -> None:
+    solids = np.array([wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes])
+    point_m = np.array([[20.0, 0.0, 1.5], [20.0, 0.0, 3.0], [20.0, 4.0, 1.5]])
+    stopped, is_open = Ways.between(CHARGE_M, point_m, 100.0, NOTHING).stopped_by_each(solids)
+    together = Ways.between(CHARGE_M, point_m, 100.0, solids)
+    assert (stopped.max(axis=0) == together.stopped).all()
+    assert (is_open.all(axis=0) == together.is_straight_open).all()
+
+
 OUTWARD = np.array([[-0.6, 0.8]])
 
 
