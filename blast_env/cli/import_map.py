@@ -130,7 +130,7 @@ def import_map(
         False, "--strict", help="Refuse a file where anything was guessed or left out."
     ),
 ) -> None:
-    """Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.
+    """Make a scenario from a map, drawing or model: GeoJSON, OpenStreetMap, DXF, IFC.
 
     The site is turned to the direction of most walls, and buildings are polygons; the table gives
     the deviation of the modules of each building from its outline.

@@ -26,6 +26,7 @@ _ROUNDING_M: Final = 0.05
 _LEAST_M2: Final = 0.01
 _HALF: Final = 0.5
 _HAIR_M: Final = 1e-3
+_NOISE_M: Final = 5e-3
 _MITRE: Final = 1.5  # a right angle has 1.41
 
 
@@ -122,8 +123,8 @@ class Faces:
         inside = enclosed(feet)
         found = []
         for outline, top_m in self._levels(ground_m + least_height_m, least_m2):
-            stands = shapely.intersection(outline, inside)
-            for piece, is_thin in _pieces(shapely.difference(outline, inside)):
+            stands = common(outline, inside)
+            for piece, is_thin in _pieces(_without(outline, inside)):
                 base_m = self._base_m(piece, ground_m, top_m)
                 if base_m is None:
                     stands = shapely.union(stands, piece)
@@ -142,7 +143,7 @@ class Faces:
             level = left & (self.high_m > self.high_m[left].max() - LEAST_STOREY_M)
             left &= ~level
             shape = _closed(shapely.union(higher, self._union(level)))
-            for walls in shapely.get_parts(areas_of(shapely.difference(shape, higher))):
+            for walls in shapely.get_parts(_without(shape, higher)):
                 outline = self._roofed(walls, above_m, float(self.high_m[level].max()))
                 if outline.area >= least_m2:
                     higher = shapely.union(higher, outline, grid_size=_GRID_M)
@@ -160,7 +161,7 @@ class Faces:
         rooms = [
             room
             for room in np.atleast_1d(np.asarray(shapely.polygons(holes)))
-            if shapely.intersection(room, floor).area > _HALF * room.area
+            if common(room, floor).area > _HALF * room.area
         ]
         return areas_of(shapely.union_all([walls, *rooms], grid_size=_GRID_M))
 
@@ -182,6 +183,17 @@ class Faces:
         return np.asarray(self.high_m > ground_m + LEAST_STOREY_M)
 
 
+def common(one: BaseGeometry, other: BaseGeometry) -> BaseGeometry:
+    """Return the common area of two, without the lines and points where they only touch."""
+    return areas_of(shapely.intersection(one, other))
+
+
+def _without(one: BaseGeometry, other: BaseGeometry) -> BaseGeometry:
+    """Return the area of one without that of another."""
+    # Where borders in any direction run together, the difference has lines too.
+    return areas_of(shapely.difference(one, other))
+
+
 def _plan(corners_m: FloatArray) -> BaseGeometry:
     """Return the area of a face in plan, or the line of a vertical one."""
     area = shapely.Polygon(corners_m)
@@ -200,9 +212,14 @@ def _closed(shape: BaseGeometry) -> BaseGeometry:
 
 
 def _apart(shape: BaseGeometry) -> BaseGeometry:
-    """Return a shape without places where it meets itself, which rounding would make a crossing."""
+    """Return a shape that no rounding makes cross itself.
+
+    It has no places where it meets itself, and no corners as near to each other as those that
+    unions of turned faces leave.
+    """
     inner = shapely.buffer(shape, -_HAIR_M, join_style="mitre")
-    return areas_of(shapely.buffer(inner, _HAIR_M, join_style="mitre"))
+    outer = shapely.buffer(inner, _HAIR_M, join_style="mitre")
+    return areas_of(shapely.simplify(outer, _NOISE_M))
 
 
 def enclosed(feet: Sequence[BaseGeometry]) -> BaseGeometry:
@@ -222,7 +239,7 @@ def enclosed(feet: Sequence[BaseGeometry]) -> BaseGeometry:
 def _pieces(shape: BaseGeometry) -> Iterator[tuple[BaseGeometry, bool]]:
     """Yield the parts of a shape that are wide, and those that are narrower than a storey."""
     inner = shapely.buffer(shape, -_THIN_M, join_style="mitre")
-    wide = shapely.intersection(shapely.buffer(inner, _THIN_M, join_style="mitre"), shape)
-    for area, is_thin in ((wide, False), (shapely.difference(shape, wide), True)):
-        for piece in shapely.get_parts(areas_of(area)):
+    wide = common(shapely.buffer(inner, _THIN_M, join_style="mitre"), shape)
+    for area, is_thin in ((wide, False), (_without(shape, wide), True)):
+        for piece in shapely.get_parts(area):
             yield piece, is_thin

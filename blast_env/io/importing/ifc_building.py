@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces, enclosed
+from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces, common, enclosed
 from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.site_map import MapFeature, Tags
@@ -303,7 +303,7 @@ class Building:
         """Return the area that walls enclose at a height, as far as it is built over."""
         section = shapely.union_all([self._bodies[number].outline for number in around])
         walls = [each.shadow for each in self._walls if each.low_m < height_m < each.high_m]
-        inside = shapely.intersection(enclosed(walls), section) if walls else section
+        inside = common(enclosed(walls), section) if walls else section
         return inside if inside.area else section
 
     @cached_property

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from ezdxf.document import Drawing
-from ezdxf.filemanagement import new, readfile
+from ezdxf.filemanagement import new
 from ezdxf.layouts.blocklayout import BlockLayout
 from ezdxf.layouts.layout import Modelspace
 from ezdxf.render.forms import cube
@@ -255,32 +255,3 @@ def test_every_entity_has_its_fate_and_every_building_its_solid(
     rounded = sorted((round(area, 1), base, height) for area, base, height in solids)
     assert [each[1:] for each in rounded] == [each[1:] for each in expected]
     assert [each[0] for each in rounded] == pytest.approx([each[0] for each in expected], rel=0.02)
-
-
-@given(towns())
-@settings(max_examples=15, deadline=None, derandomize=True)
-def test_drawings_read_by_ezdxf_alone_agree(
-    tmp_path_factory: pytest.TempPathFactory, town: Town
-) -> None:
-    """Hold area and rise of all extruded outlines against ezdxf's own entities in the world."""
-    folder = tmp_path_factory.mktemp("drawn")
-    site = imported(town, folder)
-    found = []
-    entities = [*readfile(folder / "town.dxf").modelspace()]
-    while entities:
-        entity: Any = entities.pop()
-        if entity.dxf.get("invisible") or entity.dxf.layer == "TREES":
-            continue
-        if entity.dxftype() == "INSERT":
-            rows = entity.multi_insert() if entity.mcount > 1 else [entity]
-            entities += [part for each in rows for part in each.virtual_entities()]
-        elif entity.dxftype() == "LWPOLYLINE":
-            corners = list(entity.vertices_in_wcs())
-            pairs = zip(corners, corners[1:] + corners[:1], strict=True)
-            area = 0.5 * abs(sum(a.x * b.y - b.x * a.y for a, b in pairs))
-            found.append((area / town.unit**2, abs(entity.dxf.thickness) / town.unit))
-    own = {round(each.outline.area) for each in site.buildings}
-    rises = {each.wall_height_m for each in site.buildings}
-    for area, rise in found:
-        assert round(area) in own | {400}  # the podium, of which the tower takes a part
-        assert {rise, rise - 0.5, 2.0 * rise} & rises

@@ -1,6 +1,12 @@
-"""Area, height and base of random buildings against shapely, pyproj and osmium used directly."""
+"""Area, height and base of random buildings, as other libraries read them from the same file.
+
+Used directly: shapely and pyproj for GeoJSON, osmium for OpenStreetMap, ezdxf for DXF, ifcopenshell
+for IFC.
+"""
 
 import json
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +14,20 @@ import numpy as np
 import osmium
 import pytest
 import shapely
+from ezdxf.disassemble import recursive_decompose
+from ezdxf.filemanagement import new, readfile
+from ezdxf.render.mesh import MeshBuilder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod, Transformer
-from shapely.affinity import rotate, translate
+from shapely.affinity import rotate, scale, translate
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing.bodies import LEAST_STOREY_M
+from tests.io.importing.models import LOT_M, MIDDLE, TURNS_DEG, UNITS, WALL_M, WAYS, Model
 
 GEOD = Geod(ellps="WGS84")
-LOT_M = 60.0
 TO_DEGREES = Transformer.from_crs("EPSG:25832", "EPSG:4326", always_xy=True)
 CORNER = (565_000.0, 5_934_000.0)
 """A place in UTM zone 32."""
@@ -142,3 +152,157 @@ def areas_of_osmium(path: Path) -> dict[str, tuple[BaseGeometry, dict[str, str]]
             shape = shapely.from_wkb(factory.create_multipolygon(item))
             found[f"{kind} {item.orig_id()}"] = shape, tags
     return found
+
+
+Solid = tuple[float, float, float]
+"""Area, m2, underside and top above the ground, m."""
+
+
+def same(site: ImportedSite, expected: list[Solid]) -> None:
+    """Hold the buildings of a site against solids."""
+    own = [(each.outline.area, each.base_m, each.height_m) for each in site.buildings]
+    assert len(own) == len(expected)
+    for found, wanted in zip(sorted(own), sorted(expected), strict=True):
+        assert found == pytest.approx(wanted, rel=1e-3, abs=1e-6)
+
+
+def solid_of(corners: np.ndarray[Any, Any], faces: list[list[int]]) -> Solid:
+    """Return what faces cover, and the heights of their corners (n, 3), m."""
+    plans = [shapely.Polygon(corners[face, :2]) for face in faces]
+    shadow = shapely.union_all([each for each in plans if each.area > 1e-6], grid_size=1e-5)
+    return shadow.area, float(corners[:, 2].min()), float(corners[:, 2].max())
+
+
+@given(DRAWN, st.data())
+@settings(deadline=None, derandomize=True, max_examples=15)
+def test_buildings_of_a_drawing_are_those_of_ezdxf(
+    tmp_path_factory: pytest.TempPathFactory,
+    drawn: list[tuple[BaseGeometry, dict[str, str]]],
+    data: st.DataObject,
+) -> None:
+    """Draw outlines that are extruded, in blocks, or as meshes, and read them with ezdxf."""
+    code, unit = data.draw(st.sampled_from(((6, 1.0), (4, 1000.0), (2, 1.0 / 0.3048))))
+    zero_m = data.draw(st.sampled_from((0.0, 431.0)))
+    document = new(units=code)
+    for number, (shape, tags) in enumerate(drawn):
+        extent = zero_m + float(tags["min_height"]), zero_m + float(tags["height"])
+        draw_prism(document, shape, extent, unit, (LOT_M * number, data.draw(st.sampled_from(HOW))))
+    path = tmp_path_factory.mktemp("drawn") / "drawing.dxf"
+    document.saveas(path)
+    place = (20.0 * unit, -30.0 * unit)
+    options = ImportOptions(
+        buildings_from=("BLD",), protect_near=place, charge_at=(place,), margin_m=60.0
+    )
+    solids = list(solids_of_ezdxf(path, unit))
+    if zero_m:  # each stands on the ground below it
+        solids = [(area, 0.0, high - low) for area, low, high in solids]
+    same(import_site(path, options), solids)
+
+
+HOW = ("up", "down", "mirrored", "block", "mesh")
+
+
+def draw_prism(
+    document: Any,
+    shape: Any,
+    extent_m: tuple[float, float],
+    unit: float,
+    how: tuple[float, str],
+) -> None:
+    """Draw a prism on a lot; all but a mesh are without the yard."""
+    (low, high), (left_m, way) = (unit * each for each in extent_m), how
+    space, rise = document.modelspace(), high - low
+    shape = scale(translate(shape, left_m), unit, unit, origin=(0.0, 0.0))
+    if way == "mesh":
+        prism(shape, low, high).render_mesh(space, dxfattribs={"layer": "BLD"})
+        return
+    given: dict[str, Any] = {"layer": "BLD", "elevation": low, "thickness": rise}
+    if way == "down":
+        given |= {"elevation": high, "thickness": -rise}
+    elif way == "mirrored":  # the x axis of the entity goes west, and its z axis down
+        shape = scale(shape, -1.0, 1.0, origin=(0.0, 0.0))
+        given |= {"elevation": -low, "thickness": -rise, "extrusion": (0.0, 0.0, -1.0)}
+    elif way == "block":
+        space = document.blocks.new(f"HOUSE{left_m:g}")
+        turned = rotate(shape, -40.0, origin=(0.0, 0.0))
+        shape = scale(turned, 0.5, 0.5, origin=(0.0, 0.0))
+        given |= {"elevation": 0.0, "thickness": rise / 4.0, "layer": "0"}
+        place = {"rotation": 40.0, "xscale": 2.0, "yscale": 2.0, "zscale": 4.0, "layer": "BLD"}
+        document.modelspace().add_blockref(space.name, (0.0, 0.0, low), dxfattribs=place)
+    space.add_lwpolyline(list(shape.exterior.coords)[:-1], close=True, dxfattribs=given)
+
+
+def prism(shape: Any, low: float, high: float) -> MeshBuilder:
+    """Return the faces of a prism: triangles below and above, and walls."""
+    mesh = MeshBuilder()
+    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(shape)):
+        for z in (low, high):
+            mesh.add_face([(x, y, z) for x, y in list(triangle.exterior.coords)[:-1]])
+    for ring in (shape.exterior, *shape.interiors):
+        for (a, b), (c, d) in pairwise(ring.coords):
+            mesh.add_face([(a, b, low), (c, d, low), (c, d, high), (a, b, high)])
+    return mesh
+
+
+def solids_of_ezdxf(path: Path, unit: float) -> Iterator[Solid]:
+    entity: Any
+    for entity in recursive_decompose(readfile(path).modelspace()):
+        if entity.dxftype() == "MESH":
+            mesh = MeshBuilder.from_mesh(entity)
+            corners = np.array([tuple(each) for each in mesh.vertices])
+            yield solid_of(corners / unit, [list(face) for face in mesh.faces])
+        else:
+            places = np.array([tuple(each) for each in entity.vertices_in_wcs()])
+            rise = np.array(tuple(entity.dxf.extrusion)) * entity.dxf.thickness
+            corners = np.concatenate([places, places + rise])
+            yield solid_of(corners / unit, [list(range(len(places)))])
+
+
+@given(DRAWN, st.data())
+@settings(deadline=None, derandomize=True, max_examples=15)
+def test_buildings_of_a_model_are_those_of_ifcopenshell(
+    tmp_path_factory: pytest.TempPathFactory,
+    drawn: list[tuple[BaseGeometry, dict[str, str]]],
+    data: st.DataObject,
+) -> None:
+    """Build walls around outlines and roofs on them, and place their corners by ifcopenshell."""
+    ways = data.draw(st.lists(st.sampled_from(WAYS), min_size=1, max_size=5))
+    schema = data.draw(st.sampled_from(("IFC2X3", "IFC4", "IFC4X3")))
+    unit, site_m = data.draw(st.sampled_from(sorted(UNITS))), data.draw(st.sampled_from((0, 431)))
+    model = Model(unit, site_m, 0.0, schema, ways)
+    for shape, tags in drawn:
+        low_m, high_m = float(tags["min_height"]), float(tags["height"])
+        (level,) = model.building([0.0], turn_deg=data.draw(st.sampled_from(TURNS_DEG)))
+        rooms = shapely.buffer(shape, -WALL_M, join_style="mitre")
+        walls: Any = shapely.get_parts(shapely.difference(shape, rooms))
+        roof: Any = shape
+        for wall in walls:
+            model.prism("IfcWall", level, wall, low_m, high_m)
+        model.prism("IfcSlab", level, roof, high_m - 0.2, high_m)
+    path = model.write(tmp_path_factory.mktemp("models"))
+    place = (MIDDLE[0], MIDDLE[1] - 45.0)
+    options = ImportOptions(protect=("House 0",), charge_at=(place,), margin_m=60.0)
+    same(import_site(path, options), list(solids_of_ifcopenshell(path, model.scale)))
+
+
+def solids_of_ifcopenshell(path: Path, unit: float) -> Iterator[Solid]:
+    """Yield the solid of each building; what begins lower than a storey is on the ground."""
+    import ifcopenshell.geom
+    from ifcopenshell.util.placement import get_local_placement
+
+    read: Any = ifcopenshell.open(str(path))
+    settings_ = ifcopenshell.geom.settings()
+    settings_.set("use-world-coords", True)
+    for building in read.by_type("IfcBuilding"):
+        (levels,) = (link.RelatedObjects for link in building.IsDecomposedBy)
+        links = [link for level in levels for link in level.ContainsElements]
+        corners, faces, count = [], [], 0
+        for element in (part for link in links for part in link.RelatedElements):
+            shape = ifcopenshell.geom.create_shape(settings_, element)
+            corners.append(np.reshape(shape.geometry.verts, (-1, 3)))
+            faces += (np.reshape(shape.geometry.faces, (-1, 3)) + count).tolist()
+            count += len(corners[-1])
+        area, low_m, high_m = solid_of(np.concatenate(corners), faces)
+        ground_m = get_local_placement(building.ObjectPlacement)[2, 3] / unit
+        base_m = low_m - ground_m
+        yield area, base_m if base_m > LEAST_STOREY_M else 0.0, high_m - ground_m
