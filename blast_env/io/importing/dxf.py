@@ -49,7 +49,7 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.lldxf.const import DXFError
     from ezdxf.math import Matrix44, Vec2, Vec3
     from ezdxf.path import Path as DrawnPath
-    from ezdxf.path import from_hatch, make_path
+    from ezdxf.path import from_hatch, make_path, to_lwpolylines
     from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
     from ezdxf.transform import copies
 
@@ -318,8 +318,25 @@ class _Drawn:
         if entity.dxftype() == "ATTDEF":
             return []  # the insert has the attribute
         faults, found = copies([entity], place)
+        if _rise(entity).any() and not all(each.dxf.is_supported("thickness") for each in found):
+            faults, found = copies(self._chords(entity, place), place)
         self.skipped += [(each.entity, each.error.name.lower()) for each in faults]
         return found
+
+    def _chords(self, entity: DXFEntity, place: Matrix44) -> list[LWPolyline]:
+        """Return an extruded entity with chords for its arcs.
+
+        A stretched arc is an ellipse, which has no thickness.
+        """
+        names = ("layer", "thickness", "invisible")
+        given = {name: entity.dxf.get(name) for name in names if entity.dxf.hasattr(name)}
+        stretch = max(axis.magnitude for axis in (place.ux, place.uy, place.uz))
+        sag = _SAG_M / self.site_map.unit_m / max(stretch, _ROUNDING)
+        line = make_path(entity)
+        largest = max((abs(each) for point in line.control_vertices() for each in point), default=0)
+        up = Vec3(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)))
+        sag = max(sag, _LEAST_SAG * largest)
+        return list(to_lwpolylines([line], distance=sag, extrusion=up, dxfattribs=given))
 
     def _features(self, entity: DXFEntity, layer: str, place: str) -> Iterator[MapFeature]:
         """Yield the features of a simple entity: several if it is a body of several heights."""

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from ezdxf.entities.insert import Insert
 from ezdxf.filemanagement import new, readfile
@@ -179,3 +180,23 @@ def test_every_entity_of_a_drawing_has_one_fate(name: str) -> None:
         block = each.block() if isinstance(each, Insert) else None
         count += 1 if block is None else len(list(block))
     assert len(case(name).ledger.of(*FATES)) == count
+
+
+def test_a_stretched_tower_keeps_its_height(tmp_path: Path) -> None:
+    """A stretched circle or arc is an ellipse, which has no thickness."""
+    drawing = Drawing()
+    block = drawing.document.blocks.new("TOWER")
+    place = {"layer": "0", "thickness": 12.0}
+    block.add_circle((5, 5, 1), 5.0, dxfattribs=place)
+    rounded = [(20, 0, 0), (30, 0, 1), (30, 10, 0), (20, 10, 0)]
+    block.add_lwpolyline(rounded, format="xyb", close=True, dxfattribs=place)
+    scales = {"xscale": 2.0, "yscale": 1.0, "zscale": 1.5, "layer": "BLD"}
+    drawing.space.add_blockref("TOWER", (0, 0), dxfattribs=scales)
+    drawing.house(100.0, 0.0, 9.0)
+    oval, house, half = sorted(
+        (each.outline.area, each.base_m, each.height_m)
+        for each in drawing.imported(tmp_path, protect_near=(110.0, 5.0)).buildings
+    )
+    assert oval == pytest.approx((np.pi * 50.0, 1.5, 19.5), rel=0.01)
+    assert house == (200.0, 0.0, 9.0)
+    assert half == pytest.approx((200.0 + np.pi * 25.0, 0.0, 18.0), rel=0.01)
