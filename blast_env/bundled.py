@@ -14,6 +14,9 @@ ITEM_SITES: Final = "item_sites"
 LARGE_SITES: Final = "large_sites"
 """Name of such sites of real size."""
 
+GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
+"""All of them."""
+
 REAL_SIZE: Final = frozenset({"street_front", "government_forecourt", "campus", "car_park"})
 """Bundled scenarios of 90 to 120 m; tracks and studies use them only by name."""
 

@@ -339,3 +339,12 @@ def covered_m2(rectangle: Rectangle, boxes: Boxes) -> FloatArray:
     along_y = np.minimum(top, rectangle.top) - np.maximum(bottom, rectangle.bottom)
     area_m2: FloatArray = np.maximum(along_x, 0.0) * np.maximum(along_y, 0.0)
     return area_m2
+
+
+def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatArray:
+    """Return the distance (n,) of points (n, 2) to a rectangle, 0 inside."""
+    low = np.array([rectangle.left, rectangle.bottom])
+    high = np.array([rectangle.right, rectangle.top])
+    outside = np.maximum(np.maximum(low - position, position - high), 0.0)
+    distance: FloatArray = np.hypot(outside[:, 0], outside[:, 1])
+    return distance

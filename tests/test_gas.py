@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.standing import NOT_KNOWN
+from blast_env.evaluation.validation import NOT_KNOWN
 from blast_env.gas import GasRun
 from blast_env.results import EndReason
 from blast_env.site import Charge

@@ -115,7 +115,7 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
     words = f"{blasts.scenario.name}, {blasts.judged}: {verdict}: {level}, under {charges}"
     yield Line.of(words, kind="answer")
     for building in judged.buildings:
-        status = judged.standing(building).words
+        status = judged.validation(building).words
         yield Line.of(f"validation of the load that decides, {building}: {status}")
     yield from lines((f"flag: {note}" for note in judged.notes), "flag")
     if doubt := judged.doubt(target):

@@ -18,19 +18,19 @@ from blast_env.evaluation.questions.probability import (
 )
 from blast_env.evaluation.questions.verdict import Consequences
 from blast_env.evaluation.record import BlastLoads, BlastRecord, on_buildings
-from blast_env.evaluation.standing import worst_standing
+from blast_env.evaluation.validation import worst_validation
 from blast_env.site import Scenario
 from blast_env.statistics import counted_parts, reductions
 
 _TOGETHER: Final = "all protected"
 _LOADS: Final = (
     *("layout", "threat", "structure", "impulse (Pa\N{NO-BREAK SPACE}s)", "peak (kPa)", "counts: "),
-    *("reduction", "cost", "engine", "standing of the load"),
+    *("reduction", "cost", "engine", "validation of the load"),
 )
 _LOAD, _COST = _LOADS.index("counts: "), _LOADS.index("cost")
 _BUILDINGS: Final = (
     *("layout", "threat", "building", "level of protection", "its probability", "panes broken"),
-    *("worst pane (GSA, ISO)", "worst wall panel", "standing of the load", "flags"),
+    *("worst pane (GSA, ISO)", "worst wall panel", "validation of the load", "flags"),
 )
 _NONE: Final = "\N{EN DASH}"
 _DRAWS: Final = 200  # of the uncertain quantities: the table must come at once
@@ -149,7 +149,7 @@ def _loads(
         reduction,
         f"{cost:,.10g}",
         blasts.engine.words,
-        worst_standing(load.stood for part in parts for load in part.protected).words,
+        worst_validation(load.validation for part in parts for load in part.protected).words,
     )
 
 
@@ -183,7 +183,7 @@ def building_verdicts(found: Consequences) -> tuple[BuildingVerdict, ...]:
         flags = [why for building, why in found.unchecked if building == name]
         flags += [walls.words for walls in found.unjudged if walls.building == name]
         clipped = alone.level_on_cells(name) > alone.level(name)
-        cells = (words, likely, *panes, alone.standing(name).words)
+        cells = (words, likely, *panes, alone.validation(name).words)
         verdicts.append(BuildingVerdict(name, response.severity, clipped, cells, tuple(flags)))
     return tuple(verdicts)
 

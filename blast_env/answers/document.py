@@ -313,8 +313,8 @@ def charge_text(charge: Charge) -> str:
     return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
 
 
-def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
-    """Yield the standing of the load on each building, with its reason.
+def validation_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
+    """Yield the validation status of the load on each building, with its reason.
 
     Args:
         scenario: It has the titles of the buildings.
@@ -323,7 +323,7 @@ def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -
     """
     for row in buildings.to_dict("records"):
         name = building_words(scenario, str(row[column]))
-        yield f"standing of the load, {name}: {row['standing']} ({row['reason']})"
+        yield f"validation of the load, {name}: {row['validation']} ({row['reason']})"
 
 
 def worse(reduction: float) -> str:

@@ -13,7 +13,7 @@ from blast_env.answers.document import (
     building_words,
     interval,
     lines,
-    standing_lines,
+    validation_lines,
 )
 from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.questions.reduction import Evaluation
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _HEADERS: Final = (
     *("building", "protected", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
-    *("threats in range", "standing"),
+    *("threats in range", "validation"),
 )
 
 
@@ -41,7 +41,7 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     title = f"{scenario.name}: {barriers} against none, {_threats_text(count, seeds)}"
     rows = [_row(found, row) for row in buildings.to_dict("records")]
     yield Table.of(title, _HEADERS, rows, 2, 1)
-    yield from lines(standing_lines(scenario, buildings, "structure"))
+    yield from lines(validation_lines(scenario, buildings, "structure"))
     sampled = "threats" if found.engine.has_noise else "charges"
     yield from means(found, scenario.objective, sampled)
     yield from _objective(found)
@@ -97,7 +97,7 @@ def _row(found: Evaluation, row: dict[Any, Any]) -> tuple[str | Number, ...]:
         Number.share(reduction.value, row["reduction_error"]),
         interval(reduction),
         f"{row['threats_in_range']} of {len(found.threats)}",
-        row["standing"],
+        row["validation"],
     )
 
 

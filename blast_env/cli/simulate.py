@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from blast_env.answers.document import building_words, standing_lines
+from blast_env.answers.document import building_words, validation_lines
 from blast_env.answers.pieces import pieces_answer
 from blast_env.answers.terminal import print_line, print_parts, print_table
 from blast_env.cli.command import PICTURES, writes
@@ -50,7 +50,7 @@ _PARTICLE_HEADERS: Final = (
 _GAS_HEADERS: Final = (
     *("building", "protected", "impulse (Pa s)", "captured"),
     *("peak (kPa)", "arrival (ms)", "most loaded wall", "roof (Pa s)"),
-    "standing",
+    "validation",
 )
 _GAUGES: Final = ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "captured")
 
@@ -213,7 +213,7 @@ def _print_gas(result: "GasResult") -> None:
             _number(MS_PER_S * each["arrival_s"], ".1f"),
             f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
             _number(each["roof_impulse_pa_s"], ",.0f"),
-            each["standing"],
+            each["validation"],
         )
         for each in result.buildings.to_dict("records")
     ]
@@ -230,8 +230,8 @@ def _print_gas(result: "GasResult") -> None:
     if gauges:
         print_table("gauges", _GAUGES, gauges)
     print_parts(pieces_answer(result.pieces, "stability of the barrier"))
-    texts = [*standing_lines(scenario, result.buildings, "building")]
-    # One line a cause: a standing has named its own.
+    texts = [*validation_lines(scenario, result.buildings, "building")]
+    # One line a cause: a validation status has named its own.
     said = tuple(result.buildings["reason"])
     notes = dict.fromkeys(note for each in loads for note in each.notes)
     texts += [

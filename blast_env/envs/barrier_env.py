@@ -1,14 +1,14 @@
 """The environment `BlastBarrier-v0`: placing barriers to protect a structure."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.envs.actions import ACTIONS, Actions, NumberedActions
+from blast_env.envs.actions import ACTIONS, Actions
 from blast_env.envs.arguments import (
     PlainSpec,
     ResetOptions,
@@ -16,7 +16,6 @@ from blast_env.envs.arguments import (
     checked_keywords,
     strategy,
 )
-from blast_env.envs.display import Display
 from blast_env.envs.episode import (
     INVALID_ACTIONS,
     Episode,
@@ -45,6 +44,9 @@ from blast_env.site import AnyScenario
 from blast_env.site.objective import Risk
 from blast_env.statistics import CVAR_LEVEL
 from blast_env.values import real_number, whole_number
+
+if TYPE_CHECKING:
+    from blast_env.envs.display import Display
 
 
 class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
@@ -192,15 +194,16 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             engine=found,
             store=BlastStore.of(cache),
         )
-        self.task.evaluator(representative)  # an unsuitable engine fails here, not later
-        numbered = NumberedActions.of(self.task.actions, representative)
+        self.episodes = Episodes(self.task, 1)
+        numbered = self.episodes.site_of(representative).actions
         self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
         if isinstance(self.observation_space, spaces.Dict):
             mask = spaces.MultiBinary(numbered.finish + 1)
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
-        self.episodes = Episodes(self.task, 1)
-        self._display = Display(render_mode, self.metadata["render_fps"])
+        self._display: Display | None = None
+        if render_mode is not None:
+            self._display = _display(render_mode, self.metadata["render_fps"])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -215,8 +218,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         """
         super().reset(seed=seed)
         self.episodes.begin([0], [self.np_random], ResetOptions.from_mapping(options))
-        if self.render_mode == "human":
-            self._display.show(self._episode, self.placement)
+        self._show()
         return self._observation(), self.episodes.information(0)
 
     def step(self, action: np.int64 | int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -233,8 +235,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         reward = self.episodes.reward(0)
         terminated = self._episode.ended
         info = self.episodes.information(0)
-        if self.render_mode == "human":
-            self._display.show(self._episode, self.placement)
+        self._show()
         return observation, reward, terminated, False, info
 
     def _check(self, action: np.int64 | int) -> None:
@@ -290,16 +291,27 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
 
     def render(self) -> Any:
         """Return a frame (`"rgb_array"`) or text (`"ansi"`), or show a frame (`"human"`)."""
-        if not self.episodes.running:
+        if self._display is None or not self.episodes.running:
             return None
         return self._display.render(self._episode, self.placement)
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._display.close()
+        if self._display is not None:
+            self._display.close()
+
+    def _show(self) -> None:
+        if self._display is not None and self.render_mode == "human":
+            self._display.show(self._episode, self.placement)
 
     @property
     def _episode(self) -> Episode:
         if not self.episodes.running:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
         return self.episodes.running[0]
+
+
+def _display(render_mode: str, frames_per_s: int) -> "Display":
+    from blast_env.envs.display import Display  # only where somebody looks
+
+    return Display(render_mode, frames_per_s)

@@ -100,11 +100,11 @@ class Display:
     Drawing objects are made on demand and not pickled.
 
     Args:
-        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for no display.
+        render_mode: `"human"`, `"rgb_array"` or `"ansi"`.
         frames_per_s: Frames per second of the window and of films.
     """
 
-    def __init__(self, render_mode: str | None, frames_per_s: float) -> None:
+    def __init__(self, render_mode: str, frames_per_s: float) -> None:
         self._render_mode = render_mode
         self._frames_per_s = frames_per_s
         self._episode: Episode | None = None

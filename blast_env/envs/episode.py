@@ -350,10 +350,11 @@ class Episodes:
 
     def __init__(self, task: Task, count: int) -> None:
         self.task = task
-        self.layouts = LayoutBatch(LayoutState.empty(task.source.representative), count)
         self.running: list[Episode] = []
         self._sites: OrderedDict[int, _Site] = OrderedDict()
         self._most_sites = max(count, 4)
+        first = self.site_of(task.source.representative)  # an unsuitable engine fails here
+        self.layouts = LayoutBatch(first.empty, first.rules, count)
 
     def begin(
         self, indices: Sequence[int], rngs: Sequence[np.random.Generator], options: ResetOptions
@@ -404,7 +405,7 @@ class Episodes:
         """Draw site, charges and seeds of blasts (charges, realisations) of an episode."""
         task = self.task
         scenario = task.source.sample(rng)
-        site = self._site(scenario)
+        site = self.site_of(scenario)
         drawn = task.threat_model.draw(scenario, rng)
         seeds = SeedRange.TRAINING.draw(rng, (len(drawn), task.realisations))
         if options.blast_seed is not None:
@@ -605,8 +606,13 @@ class Episodes:
         episode.evaluator.counts.cache_hits += episode.seeds.size
         return True
 
-    def _site(self, scenario: Scenario) -> _Site:
-        """Return the common parts of a site; those of the last ones are kept."""
+    def site_of(self, scenario: Scenario) -> _Site:
+        """Return the common parts of a site; those of the last ones are kept.
+
+        Raises:
+            BlastEnvError: If the engine or the reward does not suit the scenario, or its size
+                differs from that of the representative one.
+        """
         key = id(scenario)
         found = self._sites.get(key)
         if found is None or found.empty.scenario is not scenario:

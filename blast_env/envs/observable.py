@@ -194,7 +194,7 @@ def cost_shares(scenario: Scenario) -> FloatArray:
 
 def cells_shown(placements: Placements) -> BoolArray:
     """Return where modules stand and where some may be placed (placements, 2, rows, columns)."""
-    return np.stack((placements.standing > 0, placements.legal.any(axis=1)), axis=1)
+    return np.stack((placements.occupancy > 0, placements.legal.any(axis=1)), axis=1)
 
 
 def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
@@ -237,7 +237,7 @@ def items_placed(placements: Placements) -> Plane:
         tables = variant_values(placements.rules[own[0]].zone)
         which: slice | list[int] = slice(None) if len(own) == len(legal) else own
         for plane, table in enumerate(tables):
-            on_cells[which, plane] = table.take(placements.standing[which], mode="clip")
+            on_cells[which, plane] = table.take(placements.occupancy[which], mode="clip")
     return on_cells
 
 

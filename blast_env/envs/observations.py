@@ -144,13 +144,13 @@ class FeaturesEpisode(BatchedObservation):
         )
         _, kinds, rows, columns = placements.legal.shape
         legal = placements.legal.view(np.uint8).reshape(-1, kinds, rows * columns)
-        standing = placements.standing.reshape(-1, rows * columns)
+        occupancy = placements.occupancy.reshape(-1, rows * columns)
         length = shares.shape[1] + constants.shape[1] + 2 * rows * columns
         if has_items:
             length += (2 + kinds) * rows * columns
         shows_vehicles = episodes[0].shows_vehicles
         vectors = np.empty((len(episodes), length + shows_vehicles), dtype=np.float32)
-        _put_vectors(own, constants, variants, shares, legal, standing, has_items, vectors)
+        _put_vectors(own, constants, variants, shares, legal, occupancy, has_items, vectors)
         if shows_vehicles:
             stand_offs = _stand_offs([each.vehicles for each in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
@@ -164,7 +164,7 @@ def _put_vectors(
     variants: Plane,
     shares: FloatArray,
     legal: NDArray[np.uint8],
-    standing: NDArray[np.uint8],
+    occupancy: NDArray[np.uint8],
     has_items: bool,  # Numba has no keywords only
     vectors: Plane,
 ) -> None:

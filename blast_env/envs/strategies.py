@@ -8,6 +8,7 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
+from blast_env.bundled import GENERATED
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Assessment
 from blast_env.geometry import Layout
@@ -20,7 +21,6 @@ from blast_env.site import (
     find_scenario,
 )
 from blast_env.site.sources import source_of
-from blast_env.sites import FAMILIES, training_sites
 
 
 class ThreatModel(Protocol):
@@ -121,7 +121,9 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
         BlastEnvError: If it has no build zone, or has another type.
     """
     source: ScenarioSource
-    if isinstance(scenario, str) and scenario in FAMILIES:
+    if isinstance(scenario, str) and scenario in GENERATED:
+        from blast_env.sites import training_sites  # generation is a room of its own
+
         source = training_sites(scenario)
     elif isinstance(scenario, str | Path | Mapping | Scenario):
         source = SingleScenario(find_scenario(scenario))

@@ -1,25 +1,32 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.evaluate import compare, evaluate_layout
-from blast_env.evaluation.evaluator import (
-    Assessment,
-    BlastEvaluator,
-    BudgetError,
-    DesignProblem,
-    Evaluators,
-)
-from blast_env.evaluation.questions.grid_error import GridError, convergence_index
-from blast_env.evaluation.questions.reduction import Evaluation, ThreatOutcome
-from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
-from blast_env.evaluation.store import BlastStore
-from blast_env.statistics import (
-    CVAR_LEVEL,
-    Estimate,
-    conditional_value_at_risk,
-    mean_estimate,
-    reduction_estimate,
-)
+from typing import TYPE_CHECKING
+
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
+    from blast_env.evaluation.evaluate import compare, evaluate_layout
+    from blast_env.evaluation.evaluator import (
+        Assessment,
+        BlastEvaluator,
+        BudgetError,
+        DesignProblem,
+        Evaluators,
+    )
+    from blast_env.evaluation.questions.grid_error import GridError, convergence_index
+    from blast_env.evaluation.questions.reduction import Evaluation, ThreatOutcome
+    from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
+    from blast_env.evaluation.store import BlastStore
+    from blast_env.statistics import (
+        CVAR_LEVEL,
+        Estimate,
+        conditional_value_at_risk,
+        mean_estimate,
+        reduction_estimate,
+    )
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "CVAR_LEVEL",

@@ -139,7 +139,7 @@ class Campaign:
             coarse,
         )
 
-    def _standing(self, layout: Layout, threat: LoadCase, record: BlastRecord) -> BlastRecord:
+    def _after_falls(self, layout: Layout, threat: LoadCase, record: BlastRecord) -> BlastRecord:
         """Return the record of a blast without the pieces that fall before it is over."""
         fallen: Layout = ()
         there = LoadCase(threat.charge_against(self.scenario, layout), threat.seed)
@@ -196,7 +196,9 @@ def _blasts_of(
                 for (name, layout), record in zip(
                     each.layouts.items(), islice(records, len(each.layouts)), strict=True
                 ):
-                    last = each._standing(layout, threat, record) if each.without_fallen else record
+                    last = (
+                        each._after_falls(layout, threat, record) if each.without_fallen else record
+                    )
                     own[name].append(last)
             yield Blasts(
                 each.case,

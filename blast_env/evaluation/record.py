@@ -19,7 +19,7 @@ from pydantic import ConfigDict, TypeAdapter
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.standing import UNSTATED, ReasonedStanding, worst_standing
+from blast_env.evaluation.validation import UNSTATED, Validation, worst_validation
 from blast_env.geometry import Layout, WallName
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import BayDamage, level_of, worst
@@ -51,7 +51,7 @@ class StructureLoad:
         area_m2: Area of the counted walls; `None` where the engine has no areas.
         response: Response of its bays in the objective; `None` unless the objective is a response.
         worst_damage: The largest damage of its bays, for the same objective.
-        stood: Standing of the load, with its reason.
+        validation: Validation status of the load, with its reason.
         impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
     """
 
@@ -67,7 +67,7 @@ class StructureLoad:
     area_m2: float | None = None
     response: float | None = None
     worst_damage: float | None = None
-    stood: ReasonedStanding = UNSTATED
+    validation: Validation = UNSTATED
     impulse_sim: float | None = None
 
     @classmethod
@@ -129,7 +129,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
         peak_pa=max(peaks_pa, default=None),
         in_range=all(each.in_range for each in counted),
         area_m2=sum(areas_m2) if is_known else None,
-        stood=worst_standing(each.stood for each in counted),
+        validation=worst_validation(each.validation for each in counted),
         impulse_sim=sum(hit) if hit else None,
     )
 
@@ -378,7 +378,7 @@ class BuildingLoad:
             wave arrives or the run ends before.
         known: Whether these impulses were known when the run ended.
         flagged: Whether there is a note on them.
-        stood: Standing of the mean impulse.
+        validation: Validation status of the mean impulse.
     """
 
     impulse_pa_s: float
@@ -391,7 +391,7 @@ class BuildingLoad:
     duration_s: float
     known: bool
     flagged: bool
-    stood: ReasonedStanding
+    validation: Validation
 
 
 class WallLoad(NamedTuple):

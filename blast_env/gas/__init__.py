@@ -1,16 +1,16 @@
 """Gas dynamics: the compressible Euler equations in three dimensions around solid cells."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from blast_env.gas.cost import CostGuess, cost_words, time_words
-from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
-from blast_env.gas.settings import CELLS, CHECKED_CELLS, Cells, GasSettings
+from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
     from blast_env.gas.coarsening import CoarseningSolver, shape_to_double, with_double_cells
+    from blast_env.gas.cost import CostGuess, cost_words, time_words
     from blast_env.gas.engine import GasRun
     from blast_env.gas.faces import Faces, exposed_faces, ground_faces
     from blast_env.gas.grid import FaceKind, GasGrid
+    from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
     from blast_env.gas.probes import (
         FaceLoads,
         Gauges,
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         Snapshots,
         positive_phases,
     )
+    from blast_env.gas.settings import CELLS, CHECKED_CELLS, Cells, GasSettings
     from blast_env.gas.solver import AIR_DENSITY_KG_M3, Burning, Gas, GasSolver, Settling
     from blast_env.gas.source import (
         LEAST_RADIUS_CELLS,
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
         set_charge,
     )
     from blast_env.gas.spherical import SphericalBlast
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "AIR_DENSITY_KG_M3",
@@ -76,71 +79,3 @@ __all__ = [
     "time_words",
     "with_double_cells",
 ]
-
-_COARSENING: Final = frozenset({"CoarseningSolver", "shape_to_double", "with_double_cells"})
-_ENGINE: Final = frozenset({"GasRun"})
-_FACES: Final = frozenset({"Faces", "exposed_faces", "ground_faces"})
-_GRID: Final = frozenset({"FaceKind", "GasGrid"})
-_PROBES: Final = frozenset(
-    {
-        "FaceLoads",
-        "Gauges",
-        "GroundMap",
-        "LoadTable",
-        "PatchHistories",
-        "Snapshots",
-        "positive_phases",
-    }
-)
-_SOLVER: Final = frozenset({"AIR_DENSITY_KG_M3", "Burning", "Gas", "GasSolver", "Settling"})
-_SOURCE: Final = frozenset(
-    {
-        "GasCharge",
-        "LEAST_RADIUS_CELLS",
-        "RadialProfile",
-        "TNT",
-        "clearance_m",
-        "largest_radius_m",
-        "lay",
-        "least_clearance_m",
-        "set_charge",
-    }
-)
-_SPHERICAL: Final = frozenset({"SphericalBlast"})
-
-
-def __getattr__(name: str) -> object:
-    """Import a module on the first use of its names: its libraries take long to import."""
-    if name in _COARSENING:
-        from blast_env.gas import coarsening
-
-        return getattr(coarsening, name)
-    if name in _ENGINE:
-        from blast_env.gas import engine
-
-        return getattr(engine, name)
-    if name in _FACES:
-        from blast_env.gas import faces
-
-        return getattr(faces, name)
-    if name in _GRID:
-        from blast_env.gas import grid
-
-        return getattr(grid, name)
-    if name in _PROBES:
-        from blast_env.gas import probes
-
-        return getattr(probes, name)
-    if name in _SOLVER:
-        from blast_env.gas import solver
-
-        return getattr(solver, name)
-    if name in _SOURCE:
-        from blast_env.gas import source
-
-        return getattr(source, name)
-    if name in _SPHERICAL:
-        from blast_env.gas import spherical
-
-        return getattr(spherical, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

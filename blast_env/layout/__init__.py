@@ -1,5 +1,7 @@
 """Layouts of barriers: legality, and layout files."""
 
+from typing import TYPE_CHECKING
+
 from blast_env.layout.build_site import (
     build_site,
     charge_against,
@@ -9,8 +11,13 @@ from blast_env.layout.build_site import (
     vehicle_reach,
     worst_places,
 )
-from blast_env.layout.files import LayoutFile, load_layout, write_layout
-from blast_env.layout.placement import LayoutState, check_layout, load_relevant, usable_cells
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.layout.files import LayoutFile, load_layout, write_layout
+    from blast_env.layout.placement import LayoutState, check_layout, load_relevant, usable_cells
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "LayoutFile",

@@ -77,11 +77,12 @@ class LayoutBatch:
 
     Args:
         start: A layout on a site of the common size.
+        rules: The rules of placing on this site.
         count: Number of layouts.
 
     Attributes:
         legal: Whether each variant may be placed (layouts, variants, rows, columns).
-        standing: Number of the variant on each cell from 1, or 0 (layouts, rows, columns).
+        occupancy: Number of the variant on each cell from 1, or 0 (layouts, rows, columns).
         table: 1 where a variant has its lower left cell (layouts, variants, rows, columns).
         left: Pieces left in all, then of each item (layouts, 1 + items).
         budget_left: Remaining budget; 0 without one (layouts,).
@@ -90,15 +91,15 @@ class LayoutBatch:
         layouts: The elements of each.
     """
 
-    def __init__(self, start: LayoutState, count: int) -> None:
+    def __init__(self, start: LayoutState, rules: PlacementRules, count: int) -> None:
         shape = start.legal.shape
         self.legal: BoolArray = np.zeros((count, *shape), dtype=np.bool_)
-        self.standing: NDArray[np.uint8] = np.zeros((count, *shape[1:]), dtype=np.uint8)
+        self.occupancy: NDArray[np.uint8] = np.zeros((count, *shape[1:]), dtype=np.uint8)
         self.table: NDArray[np.int8] = np.zeros((count, *shape), dtype=np.int8)
         self.left: IntArray = np.zeros((count, 1 + len(start.catalogue.stocks)), dtype=np.int64)
         self.budget_left: FloatArray = np.zeros(count)
         self.is_full: BoolArray = np.zeros(count, dtype=np.bool_)
-        self.rules: list[PlacementRules] = [PlacementRules.of(start)] * count
+        self.rules: list[PlacementRules] = [rules] * count
         self.layouts: list[list[Element]] = [[] for _ in range(count)]
         self._spent: list[list[float]] = [[] for _ in range(count)]
 
@@ -118,7 +119,7 @@ class LayoutBatch:
         if not catalogue.has_items:
             left[1] = start.stock_left
         rows = slice(None) if len(indices) == len(self.rules) else indices
-        self.legal[rows], self.standing[rows] = start.legal, start.standing
+        self.legal[rows], self.occupancy[rows] = start.legal, start.occupancy
         self.table[rows], self.left[rows] = table, left
         self.budget_left[rows] = start.budget_left or 0.0
         self.is_full[rows] = not start.legal.any()
@@ -145,7 +146,7 @@ class LayoutBatch:
             if rules.zone.budget is not None:
                 self._spent[index].append(rules.cost(number))
         chosen = np.array(indices)
-        arrays = self.legal, self.standing, self.table, self.left
+        arrays = self.legal, self.occupancy, self.table, self.left
         _place(chosen, np.array(numbers), self.rules[indices[0]].variants, *arrays)
         for own in of_rules.values():
             self._limit_to_budget(own)
@@ -172,7 +173,7 @@ class LayoutBatch:
         for index in indices:
             if isinstance(self.layouts[index][-1], Measure):
                 continue
-            passable = rules.passable & (self.standing[index] == 0)
+            passable = rules.passable & (self.occupancy[index] == 0)
             closing = closing_places(rules.zone.access_way, passable, rules.sizes)
             for own, closes in zip(self.legal[index], closing, strict=True):
                 own &= ~closes
@@ -180,9 +181,9 @@ class LayoutBatch:
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""
         state = LayoutState(self.rules[index].scenario, tuple(self.layouts[index]))
-        legal, standing = self.legal[index].copy(), self.standing[index].copy()
+        legal, occupancy = self.legal[index].copy(), self.occupancy[index].copy()
         legal.flags.writeable = False
-        vars(state).update(legal=legal, standing=standing)
+        vars(state).update(legal=legal, occupancy=occupancy)
         return state
 
     def placements(
@@ -205,7 +206,7 @@ class LayoutBatch:
         return Placements(
             [self.rules[index] for index in chosen],
             [self.layouts[index] for index in chosen],
-            *(legal, self.standing[rows], self.left[rows], self.budget_left[rows]),
+            *(legal, self.occupancy[rows], self.left[rows], self.budget_left[rows]),
         )
 
 
@@ -215,7 +216,7 @@ def _place(
     numbers: IntArray,
     variants: IntArray,
     legal: BoolArray,
-    standing: NDArray[np.uint8],
+    occupancy: NDArray[np.uint8],
     table: NDArray[np.int8],
     left: IntArray,
 ) -> None:
@@ -226,7 +227,7 @@ def _place(
         row, column = cell // columns, cell % columns
         high, wide, item = variants[variant]
         table[index, variant, row, column] = 1
-        standing[index, row : row + high, column : column + wide] = variant + 1
+        occupancy[index, row : row + high, column : column + wide] = variant + 1
         left[index, 0] -= 1
         left[index, 1 + item] -= 1
         for other in range(count):
@@ -265,7 +266,7 @@ class Placements:
     rules: Sequence[PlacementRules]
     layouts: Sequence[Sequence[Element]]
     legal: BoolArray
-    standing: NDArray[np.uint8]
+    occupancy: NDArray[np.uint8]
     left: IntArray
     budget_left: FloatArray
 
@@ -274,7 +275,7 @@ class Placements:
         """Return a single layout."""
         left = np.array([[state.stock_left, *state.stocks_left]])
         budget_left = np.array([state.budget_left or 0.0])
-        arrays = state.legal[np.newaxis], state.standing[np.newaxis], left, budget_left
+        arrays = state.legal[np.newaxis], state.occupancy[np.newaxis], left, budget_left
         return cls([PlacementRules.of(state)], [state.layout], *arrays)
 
     def layout(self, position: int) -> Layout:

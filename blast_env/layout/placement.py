@@ -108,9 +108,9 @@ class LayoutState:
                 raise LayoutError(reason)
         placed = LayoutState(self.scenario, (*self.layout, element))
         # Deriving them anew would double the time of a step of the environment.
-        standing = self.standing.copy()
-        self._stand(standing, element)
-        vars(placed).update(_empty_zone=self._empty_zone, standing=standing)
+        occupancy = self.occupancy.copy()
+        self._stand(occupancy, element)
+        vars(placed).update(_empty_zone=self._empty_zone, occupancy=occupancy)
         return placed
 
     def _is_known_legal(self, element: Element) -> bool:
@@ -167,18 +167,18 @@ class LayoutState:
         return legal
 
     @cached_property
-    def standing(self) -> NDArray[np.uint8]:
+    def occupancy(self) -> NDArray[np.uint8]:
         """Number of the variant on each cell, from 1, or 0 (rows, columns); not to be changed."""
-        standing = np.zeros(self._zone.shape, dtype=np.uint8)
+        occupancy = np.zeros(self._zone.shape, dtype=np.uint8)
         for element in self.layout:
-            self._stand(standing, element)
-        return standing
+            self._stand(occupancy, element)
+        return occupancy
 
-    def _stand(self, standing: NDArray[np.uint8], element: Element) -> None:
+    def _stand(self, occupancy: NDArray[np.uint8], element: Element) -> None:
         number = self.catalogue.variant_number(element)
         variant = self.catalogue.variants[number]
         row, column = element[:2]
-        standing[row : row + variant.rows, column : column + variant.columns] = number + 1
+        occupancy[row : row + variant.rows, column : column + variant.columns] = number + 1
 
     @cached_property
     def free(self) -> BoolArray:
@@ -211,7 +211,7 @@ class LayoutState:
             possible: A subset of `legal`, of the same shape.
         """
         limited = LayoutState(self.scenario, self.layout)
-        vars(limited).update(_empty_zone=self._empty_zone, standing=self.standing, legal=possible)
+        vars(limited).update(_empty_zone=self._empty_zone, occupancy=self.occupancy, legal=possible)
         return limited
 
     def places(self, cells: BoolArray) -> BoolArray:
@@ -340,7 +340,7 @@ class LayoutState:
     @property
     def _taken(self) -> BoolArray:
         """Whether each cell has a module (rows, columns)."""
-        taken: BoolArray = self.standing > 0
+        taken: BoolArray = self.occupancy > 0
         return taken
 
     @cached_property
@@ -458,7 +458,7 @@ def find_legal(placements: Iterable[LayoutState]) -> None:
 def _legal_of(placements: Sequence[LayoutState]) -> BoolArray:
     """Return `LayoutState.legal` of states of one site (states, variants, rows, columns)."""
     cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
-    taken = np.array([each.standing for each in placements]) > 0
+    taken = np.array([each.occupancy for each in placements]) > 0
     legal = cells.places(cells.usable & ~taken)
     if placements[0]._zone.budget is not None:
         spendable = np.array([each._spendable for each in placements])

@@ -1,25 +1,16 @@
 """The particle model of Martyniuk & Kochkarov: engines, collision tables and calibration."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from blast_env.particles.balls import (
-    Balls,
-    CollisionType,
-    air_lattice,
-    distance_to_rectangle,
-    explosion_fan,
-)
-from blast_env.particles.run import (
-    COLLISION_DTYPE,
-    BallStates,
-    BlastRun,
-    CollisionArray,
-    incidence_angle_rad,
-)
-from blast_env.particles.scene import Scene, build_scene
-from blast_env.particles.structure import ModularObstacle, load_colour, obstacle_of
+from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.particles.balls import (
+        Balls,
+        CollisionType,
+        air_lattice,
+        explosion_fan,
+    )
     from blast_env.particles.paper import (
         LINEAR,
         PAPER_LAWS,
@@ -31,6 +22,15 @@ if TYPE_CHECKING:
         metrics_row,
     )
     from blast_env.particles.recording import write_blast
+    from blast_env.particles.run import (
+        COLLISION_DTYPE,
+        BallStates,
+        BlastRun,
+        CollisionArray,
+        incidence_angle_rad,
+    )
+    from blast_env.particles.scene import Scene, build_scene
+    from blast_env.particles.structure import ModularObstacle, load_colour, obstacle_of
     from blast_env.particles.tables import (
         COLLISION_COLUMNS,
         MODULE_COLUMNS,
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
         module_table,
         structure_table,
     )
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "COLLISION_COLUMNS",
@@ -63,7 +65,6 @@ __all__ = [
     "collision_table",
     "comparative_table",
     "comparison_table",
-    "distance_to_rectangle",
     "explosion_fan",
     "faces_hit",
     "incidence_angle_rad",
@@ -74,45 +75,3 @@ __all__ = [
     "structure_table",
     "write_blast",
 ]
-
-_PAPER: Final = frozenset(
-    {
-        "LINEAR",
-        "PAPER_LAWS",
-        "POWER",
-        "PROPORTIONAL",
-        "PaperLaw",
-        "comparative_table",
-        "comparison_table",
-        "metrics_row",
-    }
-)
-_RECORDING: Final = frozenset({"write_blast"})
-_TABLES: Final = frozenset(
-    {
-        "COLLISION_COLUMNS",
-        "MODULE_COLUMNS",
-        "STRUCTURE_COLUMNS",
-        "collision_table",
-        "faces_hit",
-        "module_table",
-        "structure_table",
-    }
-)
-
-
-def __getattr__(name: str) -> object:
-    """Import a module on the first use of its names: its libraries take long to import."""
-    if name in _PAPER:
-        from blast_env.particles import paper
-
-        return getattr(paper, name)
-    if name in _RECORDING:
-        from blast_env.particles import recording
-
-        return getattr(recording, name)
-    if name in _TABLES:
-        from blast_env.particles import tables
-
-        return getattr(tables, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, distance_to_rectangle
 from blast_env.site.parameters import AirParameters, BallParameters, ExplosiveParameters
 
 _ROUNDING: Final = 1e-9  # of distances, units
@@ -158,15 +158,6 @@ def air_lattice(
         is_free[rows, columns] &= (distance > radius).reshape(is_free[rows, columns].shape)
     position = position[free]
     return Balls.of_one_kind(CollisionType.AirBall, parameters, position, np.zeros_like(position))
-
-
-def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatArray:
-    """Return the distance (n,) of points (n, 2) to a rectangle, 0 inside."""
-    low = np.array([rectangle.left, rectangle.bottom])
-    high = np.array([rectangle.right, rectangle.top])
-    outside = np.maximum(np.maximum(low - position, position - high), 0.0)
-    distance: FloatArray = np.hypot(outside[:, 0], outside[:, 1])
-    return distance
 
 
 def _centring_share(length: float, spacing: float) -> float:

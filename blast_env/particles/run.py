@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.particles.balls import distance_to_rectangle
+from blast_env.geometry import distance_to_rectangle
 from blast_env.particles.scene import Scene
 from blast_env.particles.structure import ModularObstacle
 from blast_env.results import EndReason

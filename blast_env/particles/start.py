@@ -5,12 +5,11 @@ from importlib.metadata import version
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from blast_env.particles.run import BlastRun
-from blast_env.particles.scene import Scene
-
 if TYPE_CHECKING:
     from blast_env.particles.event.engine import EventRun
     from blast_env.particles.pymunk.engine import PymunkRun
+    from blast_env.particles.run import BlastRun
+    from blast_env.particles.scene import Scene
 
 VERSIONS: Final[Mapping[str, str]] = MappingProxyType(
     {"pymunk": f"pymunk {version('pymunk')}", "event": f"event 1 (numba {version('numba')})"}
@@ -18,14 +17,14 @@ VERSIONS: Final[Mapping[str, str]] = MappingProxyType(
 """Version of the code that does the physics, by the name of the engine."""
 
 
-def start_pymunk(scene: Scene) -> "PymunkRun":
+def start_pymunk(scene: "Scene") -> "PymunkRun":
     """Return a run at time 0 in a new space."""
     from blast_env.particles.pymunk.engine import PymunkRun  # loads a compiled library
 
     return PymunkRun(scene)
 
 
-def start_event(scene: Scene, cell_units: float | None = None) -> "EventRun":
+def start_event(scene: "Scene", cell_units: float | None = None) -> "EventRun":
     """Return a run at time 0 from one collision to the next.
 
     Args:
@@ -37,7 +36,7 @@ def start_event(scene: Scene, cell_units: float | None = None) -> "EventRun":
     return EventRun(scene, cell_units)
 
 
-STARTS: Final[Mapping[str, Callable[[Scene], BlastRun]]] = MappingProxyType(
+STARTS: Final[Mapping[str, Callable[["Scene"], "BlastRun"]]] = MappingProxyType(
     {"pymunk": start_pymunk, "event": start_event}
 )
 """The start of a run, by the name of the engine."""

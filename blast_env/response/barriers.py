@@ -38,7 +38,7 @@ _STEP_S: Final = 1e-4
 _AFTER_S: Final = 3.0
 
 
-class Standing(StrEnum):
+class Stability(StrEnum):
     """Outcome of a blast for a piece."""
 
     STANDS = "stands"
@@ -129,16 +129,16 @@ class PieceResponses:
     held: FloatArray
 
     @property
-    def standing(self) -> list[Standing]:
+    def stability(self) -> list[Stability]:
         """Worst outcome of each piece; tilts up to 0.05 and slides up to 10 mm are neglected."""
         return [
-            Standing.OVERTURNS
+            Stability.OVERTURNS
             if tilt >= 1.0
-            else Standing.ROCKS
+            else Stability.ROCKS
             if tilt > 0.05
-            else Standing.SLIDES
+            else Stability.SLIDES
             if slide > 0.01
-            else Standing.STANDS
+            else Stability.STANDS
             for slide, tilt in zip(self.slide_m.tolist(), self.tilt.tolist(), strict=True)
         ]
 

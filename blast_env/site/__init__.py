@@ -1,68 +1,87 @@
 """Scenario files: models, validation, loading and saving."""
 
-from blast_env.bundled import bundled_scenarios
-from blast_env.geometry import Cell, Element, Layout, Piece
-from blast_env.problems import Problem, ScenarioError
-from blast_env.sections import Site
-from blast_env.site.blast_site import OUTWARDS, WALLS, BlastSite, Charge, Gauge, StructureOutline
-from blast_env.site.catalogue import (
-    Catalogue,
-    Hardening,
-    Item,
-    PlacedModule,
-    StockBarrier,
-    stock_barriers,
-)
-from blast_env.site.content import SCHEMA_VERSION
-from blast_env.site.files import (
-    AnyScenario,
-    find_problems,
-    find_scenario,
-    load_scenario,
-    parse_scenario,
-    save_scenario,
-    scenario_hash,
-)
-from blast_env.site.heights import highest_top_m
-from blast_env.site.models import Scenario
-from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, ObjectiveSection, WorstRisk
-from blast_env.site.parameters import (
-    ExplosiveParameters,
-    SimulationParameters,
-    for_charge,
-    parameters_digest,
-    preset,
-    with_overrides,
-    with_resolution,
-)
-from blast_env.site.presets import NamedMass, tnt_equivalent_kg
-from blast_env.site.sections import (
-    DrawingGeoreference,
-    GaugeSection,
-    MapGeoreference,
-    SimulationSection,
-)
-from blast_env.site.sight import in_sight
-from blast_env.site.sources import (
-    AnyCharge,
-    AnySource,
-    ChargeSource,
-    PointSource,
-    RectangleSource,
-    SegmentSource,
-    VehicleCharge,
-    VehicleSource,
-    ranked,
-)
-from blast_env.site.structures import (
-    AnyStructure,
-    ConcreteSquareSection,
-    ModularObstacleSection,
-    PolygonSection,
-    loaded_walls,
-)
-from blast_env.site.zone import BuildZone, CostArea, KeepOut, distance_m, source_bounds_m
-from blast_env.vehicles.access_way import AccessWay
+from typing import TYPE_CHECKING
+
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.bundled import bundled_scenarios
+    from blast_env.geometry import Cell, Element, Layout, Piece
+    from blast_env.problems import Problem, ScenarioError
+    from blast_env.sections import Site
+    from blast_env.site.blast_site import (
+        OUTWARDS,
+        WALLS,
+        BlastSite,
+        Charge,
+        Gauge,
+        StructureOutline,
+    )
+    from blast_env.site.catalogue import (
+        Catalogue,
+        Hardening,
+        Item,
+        PlacedModule,
+        StockBarrier,
+        stock_barriers,
+    )
+    from blast_env.site.content import SCHEMA_VERSION
+    from blast_env.site.files import (
+        AnyScenario,
+        find_problems,
+        find_scenario,
+        load_scenario,
+        parse_scenario,
+        save_scenario,
+        scenario_hash,
+    )
+    from blast_env.site.heights import highest_top_m
+    from blast_env.site.models import Scenario
+    from blast_env.site.objective import (
+        ConditionalValueAtRisk,
+        MeanRisk,
+        ObjectiveSection,
+        WorstRisk,
+    )
+    from blast_env.site.parameters import (
+        ExplosiveParameters,
+        SimulationParameters,
+        for_charge,
+        parameters_digest,
+        preset,
+        with_overrides,
+        with_resolution,
+    )
+    from blast_env.site.presets import NamedMass, tnt_equivalent_kg
+    from blast_env.site.sections import (
+        DrawingGeoreference,
+        GaugeSection,
+        MapGeoreference,
+        SimulationSection,
+    )
+    from blast_env.site.sight import in_sight
+    from blast_env.site.sources import (
+        AnyCharge,
+        AnySource,
+        ChargeSource,
+        PointSource,
+        RectangleSource,
+        SegmentSource,
+        VehicleCharge,
+        VehicleSource,
+        ranked,
+    )
+    from blast_env.site.structures import (
+        AnyStructure,
+        ConcreteSquareSection,
+        ModularObstacleSection,
+        PolygonSection,
+        loaded_walls,
+    )
+    from blast_env.site.zone import BuildZone, CostArea, KeepOut, distance_m, source_bounds_m
+    from blast_env.vehicles.access_way import AccessWay
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "OUTWARDS",

@@ -1,29 +1,36 @@
 """Generated sites: varied, valid, worth solving, and of one size per family."""
 
-from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
-from blast_env.sites.criterion import (
-    TARGETS,
-    Objection,
-    SiteCriterion,
-    SiteMeasures,
-    Visibility,
-    VisibilityCriterion,
-    cut_share_of,
-    visibility_layout,
-)
-from blast_env.sites.generate import draw_site, generate_site
-from blast_env.sites.item_sites import (
-    CLOSE_SIDES_M,
-    ITEM_KINDS,
-    POST,
-    ItemSiteRanges,
-    close_ranges,
-    large_ranges,
-)
-from blast_env.sites.module_sites import SiteRanges
-from blast_env.sites.ranges import Draws, Ranges, SpacedObstacle, draw_place
-from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
-from blast_env.sites.turning import turned
+from typing import TYPE_CHECKING
+
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
+    from blast_env.sites.criterion import (
+        TARGETS,
+        Objection,
+        SiteCriterion,
+        SiteMeasures,
+        Visibility,
+        VisibilityCriterion,
+        cut_share_of,
+        visibility_layout,
+    )
+    from blast_env.sites.generate import draw_site, generate_site
+    from blast_env.sites.item_sites import (
+        CLOSE_SIDES_M,
+        ITEM_KINDS,
+        POST,
+        ItemSiteRanges,
+        close_ranges,
+        large_ranges,
+    )
+    from blast_env.sites.module_sites import SiteRanges
+    from blast_env.sites.ranges import Draws, Ranges, SpacedObstacle, draw_place
+    from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
+    from blast_env.sites.turning import turned
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "CLOSE_SIDES_M",

@@ -13,7 +13,7 @@ from blast_env.compilation import compilation_notice
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.record import BlastLoads, StructureLoad
-from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
+from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
@@ -25,7 +25,7 @@ SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""
 
 _NOTES: Final = ("a prediction of the surrogate, not a blast",)
-_GUESSED: Final = ReasonedStanding(LoadStanding.APPROXIMATE, "a guess of gas dynamics")
+_GUESSED: Final = Validation(ValidationStatus.APPROXIMATE, "a guess of gas dynamics")
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
@@ -34,7 +34,7 @@ def _zero_loads(site: SurrogateSite) -> tuple[StructureLoad, ...]:
     """Return no load on each structure, which is that of those that are not protected."""
     peak_pa = 0.0 if site.counts_peaks else None
     return tuple(
-        StructureLoad.on(each, 0.0, peak_pa, notes=_NOTES, stood=_GUESSED)
+        StructureLoad.on(each, 0.0, peak_pa, notes=_NOTES, validation=_GUESSED)
         for each in site.scenario.structures
     )
 
@@ -63,7 +63,7 @@ class _Served:
                     of_layout[column],
                     None if peaks_pa is None else peaks_pa[index][column],
                     notes=_NOTES,
-                    stood=_GUESSED,
+                    validation=_GUESSED,
                 )
                 on_each[place] = of_layout[column]
             responds = self.site.scenario.objective.is_response

@@ -57,7 +57,7 @@ def test_a_cause_of_doubt_has_one_line(tmp_path: Path) -> None:
     save_scenario(Scenario.from_document(document, "far"), path)
     shown = run("simulate", path, "--engine", "gas").stdout.splitlines()
     (distance,) = (line for line in shown if "scaled distance" in line)
-    assert distance.startswith("standing of the load, hut: outside (scaled distance 8.63 m")
+    assert distance.startswith("validation of the load, hut: outside (scaled distance 8.63 m")
     (cells,) = (line for line in shown if "cells per m/kg^(1/3)" in line)
     assert cells.startswith("outside the validated range (marked ~): 3.4 cells")
     assert sum("outside" in line for line in shown) == 3  # these two, and the table
@@ -97,7 +97,7 @@ def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:
     path = tmp_path / "halves.toml"
     save_scenario(Scenario.from_document(document, "halves"), path)
     shown = run("simulate", path, "--engine", "gas", "--until", 0.01).stdout
-    assert shown.count("town_hall") == 2  # its row, and the standing of its load
+    assert shown.count("town_hall") == 2  # its row, and the validation of its load
     assert "south_half" not in shown
     rows = run("simulate", path, "--engine", "event").stdout.splitlines()
     (row,) = (line.split() for line in rows if "half" in line or "town_hall" in line)

@@ -22,7 +22,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.record import BlastRecord
-from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
+from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.store import Store
 from tests.attack.disks import file_size_limit
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
@@ -41,7 +41,7 @@ def loads(seed: int) -> BlastLoads:
     notes = ("far", "b\n")
     house = StructureLoad(
         *("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b"),
-        stood=ReasonedStanding(LoadStanding.OUTSIDE, "far"),
+        validation=Validation(ValidationStatus.OUTSIDE, "far"),
         impulse_sim=0.1 + 0.2,
     )
     structures = (house, replace(house, name="b", notes=()))

@@ -5,7 +5,7 @@ import pytest
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.questions.verdict import Consequences, bay_table
-from blast_env.evaluation.standing import NOT_KNOWN
+from blast_env.evaluation.validation import NOT_KNOWN
 from blast_env.site import Charge
 from tests.blasts import consequences
 from tests.gas_sites import glazed_hut, hut

@@ -38,7 +38,11 @@ def test_a_stored_blast_has_the_same_consequences(
         assert getattr(again, name) == getattr(first, name)
     (one,), (other,) = first.responses, again.responses
     np.testing.assert_array_equal(one.facade.pressure_pa, other.facade.pressure_pa)
-    assert (one.standings, one.known, one.charge) == (other.standings, other.known, other.charge)
+    assert (one.validations, one.known, one.charge) == (
+        other.validations,
+        other.known,
+        other.charge,
+    )
     known = evaluator(tmp_path)
     known.loads(LAYOUT, LoadCase(CHARGE))
     assert known.counts.blasts == 0  # an evaluation has the loads of the same blast, too

@@ -29,7 +29,8 @@ def test_a_layout_grows_as_one_placed_piece_by_piece(
     for _ in range(begun):
         legal = np.flatnonzero(state.legal)
         state = state.place(state.catalogue.element(int(rng.choice(legal))))
-    batch = LayoutBatch(LayoutState.empty(scenario), 2)
+    start = LayoutState.empty(scenario)
+    batch = LayoutBatch(start, PlacementRules.of(start), 2)
     rules = PlacementRules.of(state)
     batch.begin([0], rules, LayoutState.empty(scenario))
     batch.begin([1], rules, state)
@@ -41,7 +42,7 @@ def test_a_layout_grows_as_one_placed_piece_by_piece(
         batch.place([1], [number])
         found, expected = batch.placements([1]), Placements.of(state)
         assert (found.legal == state.legal).all()
-        assert (found.standing == state.standing).all()
+        assert (found.occupancy == state.occupancy).all()
         assert (batch.table[1] == state.catalogue.table(state.layout)).all()
         assert found.layout(0) == expected.layout(0) == state.layout
         assert found.left[0, 0] == state.stock_left

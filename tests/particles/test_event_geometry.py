@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
-from blast_env.particles import Balls, BallStates, Scene, distance_to_rectangle, obstacle_of
+from blast_env.geometry import distance_to_rectangle
+from blast_env.particles import Balls, BallStates, Scene, obstacle_of
 from blast_env.results import EndReason
 from blast_env.site import SimulationParameters, StructureOutline
 from tests.particles.scenes import (

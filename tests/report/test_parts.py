@@ -22,7 +22,7 @@ from blast_env.evaluation.places import (
 )
 from blast_env.evaluation.questions.limits import check_limits
 from blast_env.evaluation.record import BuildingLoad
-from blast_env.evaluation.standing import UNSTATED
+from blast_env.evaluation.validation import UNSTATED
 from blast_env.site import Charge, Scenario, ScenarioError
 from tests.gas_sites import site_document
 from tests.report.sites import small_hut

@@ -19,7 +19,7 @@ from blast_env.response import (
     ReinforcedConcrete,
     RigidPiece,
     Sheeting,
-    Standing,
+    Stability,
     Supports,
     Wall,
     catalogue,
@@ -172,7 +172,7 @@ def test_less_than_friction_and_weight_moves_nothing() -> None:
     force = 0.4 * PIECE.mass_kg_m * 9.81
     found = piece_responses([PIECE], np.array([0.0, 1.0]), np.full((1, 2), force))
     assert found.slide_m[0] == 0.0
-    assert found.standing == [Standing.STANDS]
+    assert found.stability == [Stability.STANDS]
 
 
 def test_the_impulse_that_overturns_by_energy() -> None:
@@ -187,7 +187,7 @@ def test_the_impulse_that_overturns_by_energy() -> None:
     )
     assert less.tilt[0] < 1.0 <= more.tilt[0]
     assert np.isinf(less.overturn_s[0])
-    assert more.standing == [Standing.OVERTURNS]
+    assert more.stability == [Stability.OVERTURNS]
 
 
 @given(
@@ -215,9 +215,9 @@ def test_a_planter_of_one_metre_slides() -> None:
     """1 x 1 m with friction 0.5 under 20 kg at 3 m; its edge would have held with friction 2."""
     load = triangle(4e6, 3000.0)
     planter = RigidPiece.of_block(2.0, 1.0, 1.0)
-    assert piece_responses([planter], *load).standing == [Standing.SLIDES]
+    assert piece_responses([planter], *load).stability == [Stability.SLIDES]
     held = replace(planter, friction=2.0)
-    assert piece_responses([held], *load).standing != [Standing.SLIDES]
+    assert piece_responses([held], *load).stability != [Stability.SLIDES]
 
 
 def test_friction_at_the_edge_limits_the_moment() -> None:
@@ -254,7 +254,7 @@ def test_anchors_hold_up_to_their_capacity() -> None:
     )
     found = piece_responses([weak, strong], time_s, np.repeat(pressure, 2, axis=0))
     assert found.held.tolist() == [0.0, 1.0]
-    assert found.standing[1] is Standing.STANDS
+    assert found.stability[1] is Stability.STANDS
 
 
 def test_studs_have_the_limits_of_walls_that_buckle() -> None:

@@ -56,7 +56,7 @@ def _threats(study: Study) -> Iterator[AnyPart]:
                 if blasts is study.blasts:
                     main.append(len(rows) - 1)
                 for record in blasts.pairs(blasts.judged)[number][::-1]:
-                    statuses.append(record.complete.buildings[name].stood.words)
+                    statuses.append(record.complete.buildings[name].validation.words)
         yield Table.of("Protected buildings", _LOADS, rows, 4, 1, main)
         words = "; ".join(dict.fromkeys(statuses))
         yield Line.of(f"Validation status of the impulses: {words}.", kind="quiet")
@@ -89,7 +89,7 @@ def _load_rows(
             Number(load.wall_impulse_pa_s),
             Number.ms(load.duration_s),
             reduction,
-            load.stood.standing.label,
+            load.validation.status.label,
         )
 
 
@@ -131,7 +131,7 @@ def _bays(study: Study) -> Iterator[AnyPart]:
             (
                 str(bare["bay"]),
                 *(cell for row in (bare, behind) for cell in _bay_cells(row)),
-                str(behind["standing"]),
+                str(behind["validation"]),
             )
             for bare, behind in both[:_MOST_BAYS]
         ]

@@ -141,7 +141,7 @@ def _basis(study: Study) -> Iterator[str]:
     words = f"{count_of('note', len(notes))} on loads outside the validated range of the engine"
     yield ", ".join(parts) + (f"; {words}" if notes else "") + "."
     for name in study.protected.buildings:
-        words = study.protected.standing(name).words
+        words = study.protected.validation(name).words
         title = study.scenario.title_of(name)
         yield f"Validation of the load that decides on {title}: {words}."
     yield "Components and costs of the site file; frames and anchors hold."
@@ -164,7 +164,7 @@ def _loads(study: Study) -> Iterator[AnyPart]:
                 Number(worst.value, error=worst.error),
                 span[1] if len(effects) == 1 else Line.of(span[0], " to ", span[1]),
                 Number.kpa(load.peak_pa),
-                load.stood.standing.label,
+                load.validation.status.label,
             )
         )
     headers = (

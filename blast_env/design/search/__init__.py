@@ -1,43 +1,50 @@
 """Proposers: classical searches and rules, with their problem (`registry` lists all of them)."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from blast_env.design.search.advice import (
-    MeasureKind,
-    advise,
-    advise_until,
-    against_each,
-    kinds_for,
-    only,
-)
-from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
-from blast_env.design.search.methods import BestRuleSearch, PopulationAnnealingSearch, RandomSearch
-from blast_env.design.search.moves import Moves, random_part, random_walls
-from blast_env.design.search.problem import (
-    Candidate,
-    LayoutAgent,
-    Progress,
-    Proposer,
-    Report,
-    SamplingAgent,
-    SearchResult,
-)
-from blast_env.design.search.registry import (
-    Need,
-    ProposerKind,
-    ProposerRow,
-    RuleProposer,
-    find_proposer,
-    layouts_by_rule,
-    proposers,
-)
-from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
-from blast_env.evaluation import DesignProblem
-from blast_env.geometry import Layout
+from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.design.search.advice import (
+        MeasureKind,
+        advise,
+        advise_until,
+        against_each,
+        kinds_for,
+        only,
+    )
+    from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
     from blast_env.design.search.learnt import Guesses, LearntSearch, improved, search_by
+    from blast_env.design.search.methods import (
+        BestRuleSearch,
+        PopulationAnnealingSearch,
+        RandomSearch,
+    )
+    from blast_env.design.search.moves import Moves, random_part, random_walls
     from blast_env.design.search.operators import cut, individual, layout_of, mixed, repaired
+    from blast_env.design.search.problem import (
+        Candidate,
+        LayoutAgent,
+        Progress,
+        Proposer,
+        Report,
+        SamplingAgent,
+        SearchResult,
+    )
+    from blast_env.design.search.registry import (
+        Need,
+        ProposerKind,
+        ProposerRow,
+        RuleProposer,
+        find_proposer,
+        layouts_by_rule,
+        proposers,
+    )
+    from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
+    from blast_env.evaluation import DesignProblem
+    from blast_env.geometry import Layout
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "BestRuleSearch",
@@ -84,19 +91,3 @@ __all__ = [
     "repaired",
     "search_by",
 ]
-
-_LEARNT: Final = frozenset({"Guesses", "LearntSearch", "improved", "search_by"})
-_OPERATORS: Final = frozenset({"cut", "individual", "layout_of", "mixed", "repaired"})
-
-
-def __getattr__(name: str) -> object:
-    """Import a module on the first use of its names: its libraries take long to import."""
-    if name in _LEARNT:
-        from blast_env.design.search import learnt
-
-        return getattr(learnt, name)
-    if name in _OPERATORS:
-        from blast_env.design.search import operators
-
-        return getattr(operators, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -3,19 +3,26 @@
 `engines.gas` is not imported here, because it imports Numba, which takes half a second.
 """
 
-from blast_env.evaluation.engines.contract import (
-    CALIBRATED_ENGINES,
-    ENGINE_NAMES,
-    JUDGE,
-    PAPER_ENGINES,
-    Engine,
-    default_engine,
-    final_engine,
-    find_engine,
-)
-from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
-from blast_env.evaluation.engines.simulate import simulate
-from blast_env.evaluation.record import BlastLoads, StructureLoad
+from typing import TYPE_CHECKING
+
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.evaluation.engines.contract import (
+        CALIBRATED_ENGINES,
+        ENGINE_NAMES,
+        JUDGE,
+        PAPER_ENGINES,
+        Engine,
+        default_engine,
+        final_engine,
+        find_engine,
+    )
+    from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
+    from blast_env.evaluation.engines.simulation import simulate
+    from blast_env.evaluation.record import BlastLoads, StructureLoad
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "CALIBRATED_ENGINES",

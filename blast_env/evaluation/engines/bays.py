@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
+from blast_env.evaluation.engines.gas_validation import bay_validations
 from blast_env.evaluation.record import UnjudgedWalls
-from blast_env.evaluation.standing import STANDING_COLUMNS, ReasonedStanding, bay_standings
+from blast_env.evaluation.validation import VALIDATION_COLUMNS, Validation
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
@@ -55,7 +56,7 @@ BAY_COLUMNS: Final = (
 )
 """One row per bay; values for components that a bay lacks are empty."""
 
-LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN, *STANDING_COLUMNS)
+LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN, *VALIDATION_COLUMNS)
 """One row per bay under a blast."""
 
 
@@ -134,8 +135,8 @@ class BayLoads:
             return table_of([], LOADED_BAY_COLUMNS)
         known = self.known(run)
         cells = cbrt(run.site.charge.tnt_kg) / run.grid.cell_m
-        standings = bay_standings(run.site, [each.bay for each in self.bays], cells, known)
-        return table_of(bay_rows(self.response, known, standings), LOADED_BAY_COLUMNS)
+        validations = bay_validations(run.site, [each.bay for each in self.bays], cells, known)
+        return table_of(bay_rows(self.response, known, validations), LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
         """Return whether the load of each bay was known at the end of the run, by its name."""
@@ -178,14 +179,14 @@ def unjudged_walls(
 
 
 def bay_rows(
-    found: FacadeResponse, known: Mapping[str, bool], standings: Sequence[ReasonedStanding]
+    found: FacadeResponse, known: Mapping[str, bool], validations: Sequence[Validation]
 ) -> list[dict[str, object]]:
     """Return the response of bays, one row each, with the keys of `LOADED_BAY_COLUMNS`.
 
     Args:
         found: The response.
         known: Whether the loads are known, by bay.
-        standings: The standing of each load.
+        validations: The validation status of each load.
     """
     panes = {index: row for row, index in enumerate(found.glazed.tolist())}
     panels = {index: row for row, index in enumerate(found.walled.tolist())}
@@ -213,8 +214,8 @@ def bay_rows(
             "edge_force_n_m": np.nan,
             "support_force_n_m": np.nan,
             "known": known.get(bay.name, False),
-            "standing": standings[index].standing.label,
-            "reason": standings[index].reason,
+            "validation": validations[index].status.label,
+            "reason": validations[index].reason,
         }
         if index in panes:
             pane = panes[index]

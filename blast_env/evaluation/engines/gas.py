@@ -24,6 +24,7 @@ from blast_env.evaluation.engines.contract import (
     EngineBlast,
     RunnableBlast,
 )
+from blast_env.evaluation.engines.gas_validation import validation_of
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.evaluation.record import (
     BlastLoads,
@@ -31,13 +32,12 @@ from blast_env.evaluation.record import (
     StructureLoad,
     UnjudgedWalls,
 )
-from blast_env.evaluation.standing import (
+from blast_env.evaluation.validation import (
     NOT_KNOWN,
-    STANDING_COLUMNS,
-    LoadStanding,
-    ReasonedStanding,
-    standing_of,
-    worst_standing,
+    VALIDATION_COLUMNS,
+    Validation,
+    ValidationStatus,
+    worst_validation,
 )
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
@@ -347,23 +347,23 @@ class GasResult:
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
-        """One row per structure; see `STRUCTURE_COLUMNS`, and `STANDING_COLUMNS` of its load."""
-        return self._with_standing(structure_table(self.run, self.on_walls), "structure")
+        """One row per structure; see `STRUCTURE_COLUMNS`, and `VALIDATION_COLUMNS` of its load."""
+        return self._with_validation(structure_table(self.run, self.on_walls), "structure")
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
-        """One row per building, its parts combined; see `BUILDING_COLUMNS`, `STANDING_COLUMNS`."""
+        """One row per building, parts combined; see `BUILDING_COLUMNS`, `VALIDATION_COLUMNS`."""
         names = self.blast.scenario.building_names
         stepped = stepped_buildings(self.blast.scenario.structures)
         table = structure_table(self.run, self.on_walls, names, stepped)
-        return self._with_standing(table, "parts")
+        return self._with_validation(table, "parts")
 
-    def _with_standing(self, table: "pd.DataFrame", column: str) -> "pd.DataFrame":
-        """Return a table with the standing of the load on the structures that a column names."""
-        stood = [self.standing(str(names).split()) for names in table[column]]
+    def _with_validation(self, table: "pd.DataFrame", column: str) -> "pd.DataFrame":
+        """Return a table with the validation status of the load on the structures of a column."""
+        found = [self.validation(str(names).split()) for names in table[column]]
         return table.assign(
-            standing=texts([each.standing.label for each in stood]),
-            reason=texts([each.reason for each in stood]),
+            validation=texts([status.label for status, _ in found]),
+            reason=texts([reason for _, reason in found]),
         )
 
     @property
@@ -469,25 +469,25 @@ class GasResult:
                 scaled.in_range,
                 notes=scaled.notes,
                 area_m2=self._area_m2(index),
-                stood=self._stood[outline.name],
+                validation=self._validations[outline.name],
             )
             for index, outline in enumerate(self.run.site.structures)
             if not outline.is_barrier
             for scaled in [self._scaled(index)]
         )
 
-    def standing(self, names: Collection[str]) -> ReasonedStanding:
-        """Return the standing of the load on a structure, or on several that form a building."""
+    def validation(self, names: Collection[str]) -> Validation:
+        """Return the validation status of the load on a structure, or on parts of a building."""
         counted = counted_parts([each for each in self.run.site.structures if each.name in names])
-        return worst_standing(self._stood[each.name] for each in counted)
+        return worst_validation(self._validations[each.name] for each in counted)
 
     @cached_property
-    def _stood(self) -> dict[str, ReasonedStanding]:
-        """The standing of the load on the counted walls of each structure, by name."""
+    def _validations(self) -> dict[str, Validation]:
+        """The validation status of the load on the counted walls of each structure, by name."""
         structures = enumerate(self.run.site.structures)
-        return {each.name: self._standing_of(k) for k, each in structures if not each.is_barrier}
+        return {each.name: self._validated(k) for k, each in structures if not each.is_barrier}
 
-    def _standing_of(self, index: int) -> ReasonedStanding:
+    def _validated(self, index: int) -> Validation:
         run, scenario = self.run, self.blast.scenario
         outline = run.site.structures[index]
         own = self._walls(index)
@@ -495,10 +495,10 @@ class GasResult:
         outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
         if run.solver.floored_cells:
-            return ReasonedStanding(
-                LoadStanding.APPROXIMATE, _FLOORED.format(run.solver.floored_cells)
+            return Validation(
+                ValidationStatus.APPROXIMATE, _FLOORED.format(run.solver.floored_cells)
             )
-        return standing_of(
+        return validation_of(
             run.site.scaled_distance(outline),
             1.0 - float(seen.mean()) if len(own) else 0.0,
             cells_of(peak_factor(run.grid.cell_m, run.site.charge.tnt_kg)),
@@ -609,14 +609,14 @@ class GasResult:
         from blast_env.workbook import SheetTable, write_workbook
 
         tables = [
-            SheetTable("Structures", self.structures, (*STRUCTURE_COLUMNS, *STANDING_COLUMNS)),
+            SheetTable("Structures", self.structures, (*STRUCTURE_COLUMNS, *VALIDATION_COLUMNS)),
             SheetTable("Walls", self.walls, WALL_COLUMNS),
             SheetTable("Modules", self.modules, MODULE_COLUMNS),
             SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
         ]
         if len(self.buildings) < len(self.structures):
             tables.insert(
-                0, SheetTable("Buildings", self.buildings, (*BUILDING_COLUMNS, *STANDING_COLUMNS))
+                0, SheetTable("Buildings", self.buildings, (*BUILDING_COLUMNS, *VALIDATION_COLUMNS))
             )
         if len(self.bays):
             tables.append(SheetTable("Bays", self.bays, LOADED_BAY_COLUMNS))

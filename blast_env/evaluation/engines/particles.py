@@ -16,7 +16,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.evaluation.engines.contract import Engine, RunnableBlast, find_engine
 from blast_env.evaluation.record import BlastLoads, StructureLoad
-from blast_env.evaluation.standing import LoadStanding, ReasonedStanding
+from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.geometry import Element, layout_text
 from blast_env.particles.calibration.model import (
     Calibration,
@@ -24,10 +24,7 @@ from blast_env.particles.calibration.model import (
     LoadUnit,
     scenario_calibration,
 )
-from blast_env.particles.run import BallStates, BlastRun, CollisionArray
-from blast_env.particles.scene import Scene, build_scene
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
-from blast_env.particles.structure import ModularObstacle
 from blast_env.provenance import versions
 from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
@@ -38,11 +35,14 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
 
     from blast_env.particles.event.engine import EventRun
     from blast_env.particles.pymunk.engine import PymunkRun
+    from blast_env.particles.run import BallStates, BlastRun, CollisionArray
+    from blast_env.particles.scene import Scene
+    from blast_env.particles.structure import ModularObstacle
     from blast_env.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 200
-_CALIBRATED: Final = ReasonedStanding(
-    LoadStanding.APPROXIMATE, "calibrated particles, which overrate walls"
+_CALIBRATED: Final = Validation(
+    ValidationStatus.APPROXIMATE, "calibrated particles, which overrate walls"
 )
 
 PARTICLES_OVERRATE: Final = (
@@ -63,7 +63,7 @@ class ParticleEngine(Engine):
     step_name: ClassVar[str] = "steps"
 
     @abstractmethod
-    def start(self, scene: Scene) -> BlastRun:
+    def start(self, scene: "Scene") -> "BlastRun":
         """Return a run of the scene at time 0, independent of every other run."""
 
     def blast(
@@ -105,7 +105,7 @@ class PymunkEngine(ParticleEngine):
     name: str = "pymunk"
     version: str = VERSIONS["pymunk"]
 
-    def start(self, scene: Scene) -> "PymunkRun":
+    def start(self, scene: "Scene") -> "PymunkRun":
         """Return a run of the scene in a new space."""
         return start_pymunk(scene)
 
@@ -124,7 +124,7 @@ class EventEngine(ParticleEngine):
     version: str = VERSIONS["event"]
     cell_units: float | None = None
 
-    def start(self, scene: Scene) -> "EventRun":
+    def start(self, scene: "Scene") -> "EventRun":
         """Return a run of the scene at time 0."""
         return start_event(scene, self.cell_units)
 
@@ -146,8 +146,10 @@ class Blast(RunnableBlast):
     engine: str | Engine = "pymunk"
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> "Scene":
         """The initial state."""
+        from blast_env.particles.scene import build_scene  # needed when the charge goes off
+
         return build_scene(self.scenario, self.layout, self.seed, self.charge)
 
     @cached_property
@@ -155,7 +157,7 @@ class Blast(RunnableBlast):
         """The engine itself; see `find_particle_engine`."""
         return find_particle_engine(self.engine)
 
-    def start(self) -> BlastRun:
+    def start(self) -> "BlastRun":
         """Return a run at time 0."""
         return self.particle_engine.start(self.scene)
 
@@ -173,7 +175,7 @@ class Blast(RunnableBlast):
                 progress(min(run.time_s / limit_s, 1.0))
         return self.result(run)
 
-    def result(self, run: BlastRun) -> "BlastResult":
+    def result(self, run: "BlastRun") -> "BlastResult":
         """Return the outcome of a run that has ended."""
         if run.end_reason is None:
             raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
@@ -210,9 +212,9 @@ class BlastResult:
     blast: Blast
     engine_name: str
     engine_version: str
-    collision_array: CollisionArray
-    obstacles: tuple[ModularObstacle, ...]
-    final_balls: BallStates
+    collision_array: "CollisionArray"
+    obstacles: "tuple[ModularObstacle, ...]"
+    final_balls: "BallStates"
     time_s: float
     steps: int
     end_reason: EndReason
@@ -259,7 +261,7 @@ class BlastResult:
         """
         return scenario_calibration(self.blast.scenario, self.engine_name)
 
-    def obstacle(self, name: str) -> ModularObstacle:
+    def obstacle(self, name: str) -> "ModularObstacle":
         """Return a structure, or the barrier, by its name; errors name the nearest one."""
         by_name = {obstacle.name: obstacle for obstacle in self.obstacles}
         if name not in by_name:
@@ -305,9 +307,9 @@ class BlastResult:
                     scaled.pa_s,
                     in_range=scaled.in_range,
                     notes=scaled.notes,
-                    stood=_CALIBRATED
+                    validation=_CALIBRATED
                     if scaled.in_range
-                    else ReasonedStanding(LoadStanding.OUTSIDE, "; ".join(scaled.notes)),
+                    else Validation(ValidationStatus.OUTSIDE, "; ".join(scaled.notes)),
                     impulse_sim=each.impulse,
                 )
                 for each in structures

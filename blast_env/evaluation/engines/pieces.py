@@ -97,10 +97,10 @@ class PieceLoads:
         zone = scenario.build_zone
         if zone is None or not layout:
             return None
-        standing = [(each, body) for each in layout if (body := zone.rigid_piece(each)) is not None]
-        if not standing:
+        bodied = [(each, body) for each in layout if (body := zone.rigid_piece(each)) is not None]
+        if not bodied:
             return None
-        elements, bodies = zip(*standing, strict=True)
+        elements, bodies = zip(*bodied, strict=True)
         owner = np.full(zone.shape, -1)
         for index, element in enumerate(elements):
             for cell in zone.catalogue.cells(element):
@@ -215,7 +215,7 @@ class PieceLoads:
             "slide_m": found.slide_m[row],
             "tilt": found.tilt[row],
             "overturn_s": overturn_s if np.isfinite(overturn_s) else np.nan,
-            "outcome": str(found.standing[row]),
+            "outcome": str(found.stability[row]),
             "falls_in_blast": overturn_s <= end_s,
         }
 

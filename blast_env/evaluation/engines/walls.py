@@ -18,7 +18,7 @@ from blast_env.evaluation.record import (
     UnjudgedWalls,
     WallLoad,
 )
-from blast_env.evaluation.standing import NOT_KNOWN, ReasonedStanding
+from blast_env.evaluation.validation import NOT_KNOWN, Validation
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.gas.solver import Gas
@@ -149,8 +149,8 @@ class GasOutcome(Protocol):
     def impulse(self, structure: str) -> ScaledImpulse:
         """Return the impulse on a structure."""
 
-    def standing(self, names: Collection[str]) -> ReasonedStanding:
-        """Return the standing of the load on structures."""
+    def validation(self, names: Collection[str]) -> Validation:
+        """Return the validation status of the load on structures."""
 
 
 def record_of(result: GasOutcome, histories: WallHistories) -> BlastRecord:
@@ -213,7 +213,7 @@ def _building_load(
         duration_s=nan if pressure is None else first_phase_s(histories.time_s, pressure),
         known=row["known"],
         flagged=not (row["known"] and in_range),
-        stood=result.standing(names),
+        validation=result.validation(names),
     )
 
 

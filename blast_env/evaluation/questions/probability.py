@@ -29,9 +29,9 @@ import numpy as np
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.curves import Load, normally_reflected
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines.gas_validation import bay_places
 from blast_env.evaluation.questions.grid_error import GridError, impulse_of
 from blast_env.evaluation.questions.verdict import BuildingResponse, Consequences
-from blast_env.evaluation.standing import bay_places
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond

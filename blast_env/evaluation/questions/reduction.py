@@ -19,7 +19,7 @@ from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_something_ar
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.questions.grid_error import GridError, impulse_of
 from blast_env.evaluation.record import BlastLoads, BlastRecord, StructureLoad, on_buildings
-from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
+from blast_env.evaluation.validation import VALIDATION_COLUMNS, worst_validation
 from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
@@ -66,7 +66,7 @@ STRUCTURE_COLUMNS: Final = (
     ),
     Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
     Column("threats_in_range", "", "threats that the calibration was made for"),
-    *STANDING_COLUMNS,
+    *VALIDATION_COLUMNS,
 )
 
 
@@ -92,7 +92,7 @@ def _structure_row(
     """Return the row of one structure or building, whose load in a blast is given."""
     sides = [[load_of(part) for part in own] for own in blasts.records.values()]
     without, loads = sides[0], sides[-1]
-    first, stood = loads[0], worst_standing(load.stood for load in loads)
+    first, worst = loads[0], worst_validation(load.validation for load in loads)
 
     def impulse_of(record: BlastRecord) -> float:
         return load_of(record).impulse_pa_s
@@ -112,8 +112,8 @@ def _structure_row(
         "reduction_high": reduction.high,
         "reduction_error": of_reduction,
         "threats_in_range": sum(load.in_range for load in loads),
-        "standing": stood.standing.label,
-        "reason": stood.reason,
+        "validation": worst.status.label,
+        "reason": worst.reason,
     }
     both = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
     for side, own, impulse, off in both:

@@ -19,7 +19,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.standing import bay_middles
+from blast_env.evaluation.engines.gas_validation import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
 from blast_env.layout.build_site import build_site, worst_places

@@ -34,7 +34,8 @@ from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, bay_rows
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.questions.reduction import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.record import BlastRecord, UnjudgedWalls, WallLoad
-from blast_env.evaluation.standing import BayPlaces, ReasonedStanding, bay_places, bay_standings
+from blast_env.evaluation.engines.gas_validation import BayPlaces, bay_places, bay_validations
+from blast_env.evaluation.validation import Validation
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
@@ -127,16 +128,16 @@ class BuildingResponse:
         return bay_places(self.site, [bay.bay for bay in self.on_cells.bays])
 
     @cached_property
-    def standings(self) -> tuple[ReasonedStanding, ...]:
-        """The standing of the load on each bay."""
+    def validations(self) -> tuple[Validation, ...]:
+        """The validation status of the load on each bay."""
         assert self.site is not None, "the response was made without a site"
         bays = [bay.bay for bay in self.on_cells.bays]
-        return bay_standings(self.site, bays, cells_of(self.peak_factor), self.known)
+        return bay_validations(self.site, bays, cells_of(self.peak_factor), self.known)
 
     @property
     def rows(self) -> list[dict[str, object]]:
         """One row per bay; see `LOADED_BAY_COLUMNS`."""
-        return bay_rows(self.facade, self.known, self.standings)
+        return bay_rows(self.facade, self.known, self.validations)
 
     @property
     def deciding_bay(self) -> int:
@@ -353,10 +354,10 @@ class Consequences:
         """Return the lowest level from the histories on the cells, which clip peaks."""
         return min(own.on_cells.level_of_protection for own in self.of(building))
 
-    def standing(self, building: str) -> ReasonedStanding:
-        """Return the standing of the load on the bay that decides under the worst charge."""
+    def validation(self, building: str) -> Validation:
+        """Return the validation status of the load on the deciding bay under the worst charge."""
         worst = max(self.of(building), key=lambda own: own.severity)
-        return worst.standings[worst.deciding_bay]
+        return worst.validations[worst.deciding_bay]
 
     def level_words(self, building: str) -> str:
         """Return the level of a building as text, with that on the cells where it is higher."""
@@ -415,9 +416,9 @@ class Consequences:
     @property
     def worst_barrier(self) -> BarrierResponse | None:
         """The barrier under the charge that tilts a piece most; `None` without pieces."""
-        standing = (barrier for barrier in self.barriers if len(barrier.pieces))
+        with_pieces = (barrier for barrier in self.barriers if len(barrier.pieces))
         return max(
-            standing,
+            with_pieces,
             key=lambda own: (own.pieces["tilt"].max(), own.pieces["tilt"].sum()),
             default=None,
         )
@@ -535,14 +536,14 @@ def response_to(
 ) -> Consequences:
     """Return the consequences of one blast with the charge at its place; see `consequences_of`."""
     details = record.complete
-    standing = tuple(own for own in load_relevant(layout) if own not in record.taken_away)
+    placed = tuple(own for own in load_relevant(layout) if own not in record.taken_away)
     responses: list[BuildingResponse] = []
     if record.bays:
         bays = {part.bay.name: part for part in scenario.bays_with(layout)}
         if not bays.keys() >= {*record.bays}:
             raise BlastEnvError("the bays of the record are those of another facade")
         facade = respond([bays[bay] for bay in record.bays], record.time_s, record.pressure_pa)
-        site = build_site(scenario, standing, 0, charge)
+        site = build_site(scenario, placed, 0, charge)
         responses = by_building(scenario, facade, site, details.peak_factor, details.known)
     assert record.pieces is not None
     return Consequences(

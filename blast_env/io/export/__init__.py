@@ -1,25 +1,28 @@
 """Layouts as files for other programs: JSON, CSV, GeoJSON and DXF."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from blast_env.io.export.bill import (
-    BILL_COLUMNS,
-    PIECE_COLUMNS,
-    LayoutPlan,
-    bill_of_quantities,
-    element_table,
-)
-from blast_env.io.export.files import (
-    SUFFIXES,
-    check_target,
-    export_layout,
-    export_to,
-    feature_collection,
-    is_file,
-)
+from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.io.export.bill import (
+        BILL_COLUMNS,
+        PIECE_COLUMNS,
+        LayoutPlan,
+        bill_of_quantities,
+        element_table,
+    )
     from blast_env.io.export.dxf import clearance_outlines, drawing, key_of, note_lines, texts_of
+    from blast_env.io.export.files import (
+        SUFFIXES,
+        check_target,
+        export_layout,
+        export_to,
+        feature_collection,
+        is_file,
+    )
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "BILL_COLUMNS",
@@ -39,14 +42,3 @@ __all__ = [
     "note_lines",
     "texts_of",
 ]
-
-_DXF: Final = frozenset({"clearance_outlines", "drawing", "key_of", "note_lines", "texts_of"})
-
-
-def __getattr__(name: str) -> object:
-    """Import a module on the first use of its names: its libraries take long to import."""
-    if name in _DXF:
-        from blast_env.io.export import dxf
-
-        return getattr(dxf, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,16 +1,8 @@
 """Reference loads, the laws that scale simulated impulses to them, and their agreement."""
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from blast_env.particles.calibration.laws import Fit
-from blast_env.particles.calibration.model import (
-    CalibrationError,
-    calibrated_engines,
-    load_calibration,
-    save_calibration,
-    seen_width_m,
-    stored_calibrations,
-)
+from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
     from blast_env.particles.calibration.free_field import (
@@ -22,6 +14,17 @@ if TYPE_CHECKING:
         paper_reference,
         summarise,
     )
+    from blast_env.particles.calibration.laws import Fit
+    from blast_env.particles.calibration.model import (
+        CalibrationError,
+        calibrated_engines,
+        load_calibration,
+        save_calibration,
+        seen_width_m,
+        stored_calibrations,
+    )
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "CalibrationError",
@@ -39,24 +42,3 @@ __all__ = [
     "stored_calibrations",
     "summarise",
 ]
-
-_FREE_FIELD: Final = frozenset(
-    {
-        "CalibrationReport",
-        "FreeFieldStudy",
-        "calibrate",
-        "impulse_by_seed",
-        "kingery_bulmash_reference",
-        "paper_reference",
-        "summarise",
-    }
-)
-
-
-def __getattr__(name: str) -> object:
-    """Import a module on the first use of its names: its libraries take long to import."""
-    if name in _FREE_FIELD:
-        from blast_env.particles.calibration import free_field
-
-        return getattr(free_field, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

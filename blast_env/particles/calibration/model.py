@@ -12,7 +12,7 @@ from importlib.resources import files
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -20,16 +20,17 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word, value_text
 from blast_env.files import write_text
-from blast_env.geometry import Rectangle
-from blast_env.particles.balls import distance_to_rectangle
+from blast_env.geometry import Rectangle, distance_to_rectangle
 from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
-from blast_env.particles.structure import ModularObstacle
 from blast_env.results import ScaledImpulse
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.parameters import SimulationParameters, parameters_digest
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI
 from blast_env.values import path_of
+
+if TYPE_CHECKING:  # a calibration is read long before there are balls and parts
+    from blast_env.particles.structure import ModularObstacle
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
 """The paper's sum of m |v|, or the momentum actually transferred along the normals."""
@@ -208,7 +209,7 @@ class Calibration(CalibrationSection):
             notes.append(f"charge {tnt_kg:g} kg TNT is not {bounds}")
         return ScaledImpulse(psi_s * PA_PER_PSI, not notes, tuple(notes))
 
-    def convert_load(self, obstacle: ModularObstacle, charge: Charge) -> ScaledImpulse:
+    def convert_load(self, obstacle: "ModularObstacle", charge: Charge) -> ScaledImpulse:
         """Convert the load on a structure; see `convert`.
 
         Args:
@@ -223,7 +224,7 @@ class Calibration(CalibrationSection):
         return self.convert(impulse_sim, width_m, distance_m, charge.tnt_kg)
 
 
-def _seen_width_m(obstacle: ModularObstacle, charge_m: tuple[float, float]) -> float:
+def _seen_width_m(obstacle: "ModularObstacle", charge_m: tuple[float, float]) -> float:
     """Return the `seen_width_m` of a structure of any shape, m."""
     if obstacle.cells is None:
         return seen_width_m(obstacle.rectangle_m, charge_m)
@@ -388,9 +389,9 @@ class LoadUnit:
     @classmethod
     def of(
         cls,
-        obstacles: Sequence[ModularObstacle],
+        obstacles: Sequence["ModularObstacle"],
         charge: Charge,
-        convert: Callable[[ModularObstacle], ScaledImpulse],
+        convert: Callable[["ModularObstacle"], ScaledImpulse],
     ) -> "LoadUnit":
         """Return the unit for a blast and the blasts compared with it.
 
@@ -427,7 +428,7 @@ class LoadUnit:
         load = self.of_structures.get(structure)
         return None if load is None else load.factor
 
-    def of_structure(self, obstacle: ModularObstacle) -> str:
+    def of_structure(self, obstacle: "ModularObstacle") -> str:
         """Return the current load on a structure as text, with the unit."""
         factor = self.factor_of(obstacle.name)
         if factor is None:

@@ -1,91 +1,33 @@
-"""The standing of a load: how far measurements and other checks cover it.
+"""The validation status of gas dynamics' loads, from the place, the cells and the charge."""
 
-| standing | meaning |
-|---|---|
-| measured | in sight of the charge: within 6 % of Kingery and Bulmash's impulse |
-| verified | in the shade, where means agree with experiments and first waves with other codes |
-| approximate | cells too large for the charge, a charge above the ground, or an oblique wall |
-| outside | a scaled distance without comparison, or an impulse not captured |
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
-from enum import IntEnum
+from collections.abc import Mapping, Sequence
 from math import cbrt
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.evaluation.validation import NOT_KNOWN, Validation, ValidationStatus
 from blast_env.gas.oblique_walls import STEPPED
 from blast_env.gas.settings import cells_unchecked, distance_unchecked
 from blast_env.geometry import Rectangle
 from blast_env.response.facade import Bay
 from blast_env.site.blast_site import OUTWARDS, BlastSite
 from blast_env.site.sight import in_sight
-from blast_env.tables import Column
 from blast_env.units import MODULE_SIDE_M
-
-STANDING_COLUMNS: Final = (
-    Column("standing", "", "of the load: measured, verified, approximate or outside"),
-    Column("reason", "", "reason for the standing"),
-)
-"""The standing of the load of a row."""
-
-NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
-"""Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 
 _OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
 
 
-class LoadStanding(IntEnum):
-    """Standing of a load; a lower value is better."""
-
-    MEASURED = 0
-    VERIFIED = 1
-    APPROXIMATE = 2
-    OUTSIDE = 3
-
-    @property
-    def label(self) -> str:
-        """Name in lower case."""
-        return self.name.lower()
-
-
-class ReasonedStanding(NamedTuple):
-    """A standing with its reason.
-
-    Attributes:
-        standing: The standing.
-        reason: The reason, in words.
-    """
-
-    standing: LoadStanding
-    reason: str
-
-    @property
-    def words(self) -> str:
-        """Both: `approximate (4.1 cells per m/kg^(1/3), checked from 9.2)`."""
-        return f"{self.standing.label} ({self.reason})"
-
-
-UNSTATED: Final = ReasonedStanding(LoadStanding.OUTSIDE, "the engine states no checks")
-"""The standing of loads by engines that state none."""
-
-
-def worst_standing(stood: Iterable[ReasonedStanding]) -> ReasonedStanding:
-    """Return the worst of some standings, the first of equal ones; `UNSTATED` of none."""
-    return max(stood, key=lambda each: each.standing, default=UNSTATED)
-
-
-def standing_of(
+def validation_of(
     scaled_m: float,
     shaded: float,
     cells: float,
     is_known: bool,
     is_stepped: bool,
     is_raised: bool,
-) -> ReasonedStanding:
-    """Return the standing of a load.
+) -> Validation:
+    """Return the validation status of a load.
 
     Args:
         scaled_m: Scaled distance from the charge, m/kg^(1/3).
@@ -96,22 +38,22 @@ def standing_of(
         is_raised: Whether the charge is above the ground.
     """
     if not is_known:
-        return ReasonedStanding(LoadStanding.OUTSIDE, NOT_KNOWN)
+        return Validation(ValidationStatus.OUTSIDE, NOT_KNOWN)
     if words := distance_unchecked(scaled_m):
-        return ReasonedStanding(LoadStanding.OUTSIDE, words)
+        return Validation(ValidationStatus.OUTSIDE, words)
     if words := cells_unchecked(cells):
-        return ReasonedStanding(LoadStanding.APPROXIMATE, words)
+        return Validation(ValidationStatus.APPROXIMATE, words)
     if is_raised:
         words = "a charge above the ground: not compared with measurements"
-        return ReasonedStanding(LoadStanding.APPROXIMATE, words)
+        return Validation(ValidationStatus.APPROXIMATE, words)
     if is_stepped:
-        return ReasonedStanding(LoadStanding.APPROXIMATE, STEPPED)
+        return Validation(ValidationStatus.APPROXIMATE, STEPPED)
     if shaded > 0.0:
         part = "" if shaded == 1.0 else f"{shaded:.0%} of it "
         words = f"{part}in the shade: compared with experiments and other codes"
-        return ReasonedStanding(LoadStanding.VERIFIED, words)
-    return ReasonedStanding(
-        LoadStanding.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse"
+        return Validation(ValidationStatus.VERIFIED, words)
+    return Validation(
+        ValidationStatus.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse"
     )
 
 
@@ -161,10 +103,10 @@ def _outward(bay: Bay) -> tuple[float, float]:
     return OUTWARDS[bay.wall] if bay.line is None else bay.line.normal
 
 
-def bay_standings(
+def bay_validations(
     site: BlastSite, bays: Sequence[Bay], cells: float, known: Mapping[str, bool]
-) -> tuple[ReasonedStanding, ...]:
-    """Return the standings of the loads on bays.
+) -> tuple[Validation, ...]:
+    """Return the validation statuses of the loads on bays.
 
     Args:
         site: The site with its charge, structures and barrier.
@@ -174,7 +116,7 @@ def bay_standings(
     """
     places, scale = bay_places(site, bays), cbrt(site.charge.tnt_kg)
     return tuple(
-        standing_of(
+        validation_of(
             float(distance_m) / scale,
             1.0 - float(seen),
             cells,

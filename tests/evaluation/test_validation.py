@@ -1,11 +1,12 @@
-"""The standing of a load, and its reason."""
+"""The validation status of a load, and its reason."""
 
 import pytest
 
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.engines.gas_validation import validation_of
 from blast_env.evaluation.questions.verdict import bay_table
-from blast_env.evaluation.standing import LoadStanding, standing_of
+from blast_env.evaluation.validation import ValidationStatus
 from blast_env.geometry import Layout
 from blast_env.site import Charge
 from tests.blasts import consequences
@@ -13,7 +14,7 @@ from tests.gas_sites import WALL, glazed_hut, hut, site_document
 
 
 @pytest.mark.parametrize(
-    ("place", "standing", "reason"),
+    ("place", "validation", "reason"),
     [
         ((3.0, 0.0, 12.0, True, False, False), "measured", "in sight"),
         ((3.0, 1.0, 12.0, True, False, False), "verified", "in the shade"),
@@ -32,21 +33,21 @@ from tests.gas_sites import WALL, glazed_hut, hut, site_document
     ],
 )
 def test_the_worst_reason_decides(
-    place: tuple[float, float, float, bool, bool, bool], standing: str, reason: str
+    place: tuple[float, float, float, bool, bool, bool], status: str, reason: str
 ) -> None:
-    stood = standing_of(*place)
-    assert stood.standing.label == standing
-    assert reason in stood.reason
-    assert stood.words == f"{standing} ({stood.reason})"
+    found = validation_of(*place)
+    assert found.status.label == status
+    assert reason in found.reason
+    assert found.words == f"{status} ({found.reason})"
 
 
 def test_bays_have_their_standing_in_tables_and_the_deciding_one_in_the_verdict() -> None:
     found = consequences(BlastEvaluator(glazed_hut(), GasEngine()), WALL, [Charge((2.0, 4.0), 5.0)])
     table = bay_table({"wall": found})
-    assert set(table["standing"]) == {"approximate"}  # 3.4 cells per m/kg^(1/3)
+    assert set(table["validation"]) == {"approximate"}  # 3.4 cells per m/kg^(1/3)
     assert table["reason"].str.startswith("3.4 cells").all()
     (response,) = found.responses
-    assert found.standing("hut") == response.standings[response.deciding_bay]
+    assert found.validation("hut") == response.validations[response.deciding_bay]
     facade = response.facade
     worst = max(facade.glazing.hazard.max(), facade.walls.damage.max())
     own = [*facade.glazing.hazard[facade.glazed == response.deciding_bay]]
@@ -69,33 +70,36 @@ def fine_blasts() -> dict[str, GasResult]:
 def test_the_load_on_a_structure_stands_by_the_walls_that_count(
     fine_blasts: dict[str, GasResult],
 ) -> None:
-    stood = {name: each.standing(["hut"]) for name, each in fine_blasts.items()}
-    assert stood["bare"].standing is LoadStanding.MEASURED
-    assert stood["wall"].standing is LoadStanding.VERIFIED
-    assert "of it in the shade" in stood["wall"].reason  # the wall is half as wide
+    found = {name: each.validation(["hut"]) for name, each in fine_blasts.items()}
+    assert found["bare"].status is ValidationStatus.MEASURED
+    assert found["wall"].status is ValidationStatus.VERIFIED
+    assert "of it in the shade" in found["wall"].reason  # the wall is half as wide
     for name, each in fine_blasts.items():
         (load,), (row,) = each.structure_loads, each.structures.to_dict("records")
-        assert load.stood == stood[name]
-        assert (row["standing"], row["reason"]) == (stood[name].standing.label, stood[name].reason)
-        assert each.buildings["standing"].tolist() == [row["standing"]]
+        assert load.validation == found[name]
+        assert (row["validation"], row["reason"]) == (found[name].status.label, found[name].reason)
+        assert each.buildings["validation"].tolist() == [row["validation"]]
 
 
-def test_an_evaluation_has_the_worst_standing_of_its_threats() -> None:
+def test_an_evaluation_has_the_worst_validation_of_its_threats() -> None:
     """With 5 kg on cells of 0.5 m approximate, with 400 kg outside."""
     threats = [LoadCase(Charge((2.0, 4.0), kg)) for kg in (5.0, 400.0)]
     found = evaluate_layout(hut(), WALL, threats=threats, cell_m=0.5)
-    assert found.table["standing"].tolist() == ["outside"]
+    assert found.table["validation"].tolist() == ["outside"]
     assert found.table["reason"].str.startswith("scaled distance 0.54 m/kg^(1/3)").all()
-    assert found.to_dict()["structures"][0]["standing"] == "outside"
+    assert found.to_dict()["structures"][0]["validation"] == "outside"
     by_particles = evaluate_layout("courtyard", (), range(1), engine="event")
-    assert set(by_particles.table["standing"]) <= {"approximate", "outside"}
+    assert set(by_particles.table["validation"]) <= {"approximate", "outside"}
 
 
 def test_no_measurement_covers_an_air_burst() -> None:
     """20 kg at a height of 3 m on cells of 0.25 m; on the ground it is measured."""
     front = {**site_document()["structures"][0], "faces": ["west"]}
     scenario, engine = hut(structures=[front]), GasEngine(cell_m=0.25)
-    for height_m, standing in ((0.0, LoadStanding.MEASURED), (3.0, LoadStanding.APPROXIMATE)):
+    for height_m, status in (
+        (0.0, ValidationStatus.MEASURED),
+        (3.0, ValidationStatus.APPROXIMATE),
+    ):
         charge = Charge((1.5, 4.0), 13.0, height_m)
         found = GasBlast(scenario, engine=engine, charge=charge).run()
-        assert found.standing(["hut"]).standing is standing
+        assert found.validation(["hut"]).status is status
