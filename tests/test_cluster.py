@@ -139,8 +139,8 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
 
     The last test with the two, for only one of them is left.
     """
-    alone = BlastEvaluator(BALLISTIC_COURTYARD).loads_of_many(PAIRS)
-    evaluator = BlastEvaluator(BALLISTIC_COURTYARD, cache=tmp_path)
+    alone = BlastEvaluator(BALLISTIC_COURTYARD, "event").loads_of_many(PAIRS)
+    evaluator = BlastEvaluator(BALLISTIC_COURTYARD, "event", cache=tmp_path)
     shares: list[float] = []
 
     def kill_one(share: float) -> None:
@@ -154,13 +154,13 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
     assert [_bits(each) for each in found] == [_bits(each) for each in alone]
     assert shares == [pytest.approx((done + 1) / len(PAIRS)) for done in range(len(PAIRS))]
     assert evaluator.counts.blasts == len(PAIRS)
-    again = BlastEvaluator(BALLISTIC_COURTYARD, cache=tmp_path)
+    again = BlastEvaluator(BALLISTIC_COURTYARD, "event", cache=tmp_path)
     assert [_bits(each) for each in again.loads_of_many(PAIRS)] == [_bits(each) for each in alone]
     assert again.counts.blasts == 0
 
 
 def _bits(loads: BlastLoads) -> tuple[object, bytes]:
-    return loads.structures, loads.module_impulse.tobytes()
+    return loads.structures, loads.module_impulse_sim.tobytes()
 
 
 def test_work_that_kills_its_workers_is_given_up() -> None:

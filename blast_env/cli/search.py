@@ -41,11 +41,7 @@ from blast_env.cli.output import (
     resumable,
     save_pictures,
 )
-from blast_env.design.proposal import (
-    PackageProposer,
-    problem_of,
-    search_problem,
-)
+from blast_env.design.proposal import problem_of, search_problem
 from blast_env.design.rules import expected_charge
 from blast_env.design.search import (
     DesignProblem,
@@ -56,7 +52,9 @@ from blast_env.design.search import (
     layouts_by_rule,
     proposers,
 )
-from blast_env.design.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
+from blast_env.design.search.by_rule import DEFAULT_BUDGET
+from blast_env.design.search.package import PackageProposer
+from blast_env.design.search.registry import check_suits, proposer_row
 from blast_env.envs.episode import find_risk
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (

@@ -22,7 +22,7 @@ from blast_env.evaluation.cases import (
     check_distinct,
     check_something_arrives,
 )
-from blast_env.evaluation.engines import Engine, find_engine
+from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.evaluation.engines.contract import BlastDrawing, EngineBlast
 from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts_digest
 from blast_env.evaluation.store import BlastStore
@@ -87,7 +87,7 @@ class BlastEvaluator:
     def __init__(
         self,
         scenario: AnyScenario,
-        engine: str | Engine = "event",
+        engine: str | Engine = JUDGE,
         cache_size: int = 4096,
         cache: str | Path | BlastStore | None = None,
         counts: BlastCounts | None = None,

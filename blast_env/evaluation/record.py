@@ -11,6 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
@@ -140,15 +141,18 @@ class BlastLoads:
 
     Attributes:
         structures: One load per structure, in the order of the scene.
-        module_impulse: Load on each module of the structures, in the order of the scene (modules,):
-            of particles the sum of m |v|, simulation units; of gas the momentum on its walls, N s.
+        module_impulse_n_s: Momentum on the walls of the structures' modules, N s, in the order
+            of the scene (modules,); empty of particles.
         bays: Damage of the bays of facades with each of their possible components; empty unless
             the objective is a response.
+        module_impulse_sim: Sum of m |v| on each module, simulation units (modules,); empty without
+            particles.
     """
 
     structures: tuple[StructureLoad, ...]
-    module_impulse: NDArray[np.float64]
+    module_impulse_n_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     bays: tuple[BayDamage, ...] = ()
+    module_impulse_sim: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def with_facades(
         self, named: Collection[NamedBay], objective: ObjectiveSection
@@ -186,10 +190,11 @@ class BlastLoads:
         names = [structure.name for structure in found.structures]
         modules = sum(structure.modules for structure in found.structures)
         impulses = np.array([load.impulse_pa_s for load in self.structures])
+        on_modules = self.module_impulse_sim if self.has_particles else self.module_impulse_n_s
         return (
             [load.name for load in self.structures] == names
-            and self.module_impulse.shape == (modules,)
-            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse).all())
+            and on_modules.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(on_modules).all())
             and self._has_bays_of(found)
         )
 
@@ -476,14 +481,16 @@ class BlastRecord:
         header = _Header(
             structures=self.loads.structures,
             damage=self.loads.bays,
-            modules=len(self.loads.module_impulse),
+            modules_n_s=len(self.loads.module_impulse_n_s),
+            modules_sim=len(self.loads.module_impulse_sim),
             details=self.details,
             bays=self.bays,
             times=len(self.time_s),
             pieces=json.dumps(pieces),  # NaN for numbers that they lack
         )
         arrays = (
-            self.loads.module_impulse.astype("<f8"),
+            self.loads.module_impulse_n_s.astype("<f8"),
+            self.loads.module_impulse_sim.astype("<f8"),
             self.time_s.astype("<f8"),
             self.pressure_pa.astype("<f4"),  # as they were recorded
         )
@@ -498,13 +505,15 @@ class BlastRecord:
         """
         line, _, arrays = content.partition(b"\n")
         header = _HEADER.validate_json(line)
-        ends = 8 * header.modules, 8 * (header.modules + header.times)
-        modules, time_s, pressure_pa = (
+        sizes = header.modules_n_s, header.modules_sim, header.times
+        ends = [8 * end for end in accumulate(sizes)]
+        on_walls, of_particles, time_s, pressure_pa = (
             np.frombuffer(part, dtype=kind).astype(np.float64)
             for part, kind in (
                 (arrays[: ends[0]], "<f8"),
                 (arrays[ends[0] : ends[1]], "<f8"),
-                (arrays[ends[1] :], "<f4"),
+                (arrays[ends[1] : ends[2]], "<f8"),
+                (arrays[ends[2] :], "<f4"),
             )
         )
         pieces = json.loads(header.pieces)
@@ -513,7 +522,7 @@ class BlastRecord:
 
             pieces = pd.DataFrame(pieces["data"], columns=pieces["columns"])
         return cls(
-            BlastLoads(header.structures, modules, header.damage),
+            BlastLoads(header.structures, on_walls, header.damage, of_particles),
             header.details,
             header.bays,
             time_s,
@@ -530,7 +539,8 @@ class _Header:
 
     structures: tuple[StructureLoad, ...]
     damage: tuple[BayDamage, ...]
-    modules: int
+    modules_n_s: int
+    modules_sim: int
     details: BlastDetails | None
     bays: tuple[str, ...]
     times: int

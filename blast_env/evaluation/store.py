@@ -106,7 +106,8 @@ class BlastStore:
 
     def remember(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast in memory only."""
-        loads.module_impulse.flags.writeable = False  # shared by several callers
+        for on_modules in (loads.module_impulse_n_s, loads.module_impulse_sim):
+            on_modules.flags.writeable = False  # shared by several callers
         self._loads.pop(key, None)
         self._loads[key] = loads
         with suppress(KeyError):  # another thread has displaced it

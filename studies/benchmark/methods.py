@@ -16,8 +16,8 @@ from stable_baselines3 import PPO
 
 from blast_env.arrays import FloatArray
 from blast_env.benchmark import BenchmarkProblem
+from blast_env.design.search.by_rule import rule_layouts
 from blast_env.design.search.learnt import Guesses, improved
-from blast_env.design.search.registry import rule_layouts
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation import LoadCaseSet
 from blast_env.geometry import Layout

@@ -178,7 +178,7 @@ def _loads(folder: Path) -> Format:
     def read(_: Path) -> Any:
         with warnings.catch_warnings(action="ignore", category=BlastEnvWarning):
             loads = BlastStore(folder).get(key)
-        return None if loads is None else (loads.structures, loads.module_impulse.tobytes())
+        return None if loads is None else (loads.structures, loads.module_impulse_n_s.tobytes())
 
     return Format((path.read_bytes(),), _from_file(path, read), True)
 

@@ -28,4 +28,4 @@ class RowEngine(ShadeEngine):
         structures = tuple(
             replace(each, impulse_pa_s=left * each.impulse_pa_s) for each in unprotected.structures
         )
-        return BlastLoads(structures, left * unprotected.module_impulse)
+        return BlastLoads(structures, left * unprotected.module_impulse_n_s)

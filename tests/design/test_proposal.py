@@ -14,9 +14,9 @@ import blast_env
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli import app
-from blast_env.design import proposal
-from blast_env.design.proposal import LEAST_PIECE_GAIN, problem_of, worth_its_pieces
-from blast_env.design.search import layouts_by_rule
+from blast_env.design.proposal import problem_of
+from blast_env.design.search import layouts_by_rule, package
+from blast_env.design.search.package import LEAST_PIECE_GAIN, worth_its_pieces
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece, Removal
 from blast_env.layout import load_layout
@@ -62,11 +62,11 @@ def test_a_better_rule_takes_the_place_of_the_layout_and_nothing_falls_below_it(
 def test_the_gain_that_is_expected_is_that_of_the_surrogate_and_no_less_than_a_rules() -> None:
     found = blast_env.propose(wide_yard(), CHARGE)
     problem = problem_of(wide_yard(), CHARGE)
-    guesses = proposal._guesses(problem)
+    guesses = package._guesses(problem)
     unprotected, load = guesses.loads([(), found.layout])
     assert found.gain is not None
     assert found.gain == pytest.approx(1.0 - load / unprotected)
-    assert found.gain > proposal.LEAST_GAIN
+    assert found.gain > package.LEAST_GAIN
     rules = [tuple(sorted(each)) for each in layouts_by_rule(wide_yard(), CHARGE).values()]
     assert load <= guesses.loads(rules).min()
 
@@ -84,7 +84,7 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     layouts = [*layouts_by_rule(wide_yard(), CHARGE).values()]
     pieces = {piece for layout in layouts for piece in layout}
     weak = Additive({piece: 0.016 / max(map(len, layouts)) for piece in pieces})
-    monkeypatch.setattr(proposal, "_guesses", lambda _: weak)
+    monkeypatch.setattr(package, "_guesses", lambda _: weak)
     found = blast_env.propose(wide_yard(), CHARGE)
     assert (found.layout, found.gain) == ((), 0.0)
     save_scenario(wide_yard(), tmp_path / "yard.toml")
@@ -117,7 +117,7 @@ def test_single_modules_are_proposed_without_a_blast(monkeypatch: pytest.MonkeyP
     found = blast_env.propose(site, CHARGE)
     assert 1 <= len(found.layout) <= 6
     assert found.gain is not None
-    assert found.gain > proposal.LEAST_GAIN
+    assert found.gain > package.LEAST_GAIN
 
 
 def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(

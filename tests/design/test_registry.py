@@ -1,5 +1,6 @@
 """A rule and a search are a file and a line each, and then they are everywhere."""
 
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,7 +20,9 @@ from blast_env.design.search import (
     ProposerKind,
     ProposerRow,
     Report,
+    RuleProposer,
     SearchResult,
+    by_rule,
     layouts_by_rule,
     registry,
 )
@@ -27,23 +30,27 @@ from blast_env.errors import BlastEnvError
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner
+from tests.design.one_after_another import OneAfterAnother
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut
 from tests.surrogate.test_surrogate import YARD, by_hand
 
 OWN = {
     "corner": ProposerRow(
-        "tests.design.corner:fill_from_the_corner", "from the corner", ProposerKind.RULE, budget=0
+        partial(RuleProposer, "corner", fill_from_the_corner),
+        "from the corner",
+        ProposerKind.RULE,
+        budget=0,
     ),
-    "one_after_another": ProposerRow(
-        "tests.design.one_after_another:OneAfterAnother", "one after another", budget=6
-    ),
+    "one_after_another": ProposerRow(OneAfterAnother, "one after another", budget=6),
 }
 
 
 @pytest.fixture(autouse=True)
 def two_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the lines: the files are `tests/design/corner.py` and `one_after_another.py`."""
+    corner = {"corner": OWN["corner"]}
+    monkeypatch.setattr(by_rule, "RULES", MappingProxyType({**by_rule.RULES, **corner}))
     monkeypatch.setattr(registry, "_TABLE", MappingProxyType({**registry._TABLE, **OWN}))
 
 

@@ -9,7 +9,7 @@ from tests.figures import undrawn_package as undrawn_package
 
 @pytest.fixture(scope="session")
 def evaluator() -> BlastEvaluator:
-    return BlastEvaluator(COURTYARD)
+    return BlastEvaluator(COURTYARD, "event")
 
 
 @pytest.fixture(scope="session")

@@ -52,7 +52,7 @@ def same(one: BlastLoads | None, other: BlastLoads) -> bool:
     """Whether two loads are equal to the last bit."""
     if one is None or one.structures != other.structures:
         return False
-    return one.module_impulse.tobytes() == other.module_impulse.tobytes()
+    return one.module_impulse_n_s.tobytes() == other.module_impulse_n_s.tobytes()
 
 
 def test_loads_come_back_to_the_last_bit_also_for_another_object(tmp_path: Path) -> None:
@@ -157,8 +157,8 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda good: replace(good, module_impulse=good.module_impulse[1:]),
-        lambda good: replace(good, module_impulse=good.module_impulse * np.nan),
+        lambda good: replace(good, module_impulse_n_s=good.module_impulse_n_s[1:]),
+        lambda good: replace(good, module_impulse_n_s=good.module_impulse_n_s * np.nan),
         lambda good: replace(good, structures=good.structures[:0]),
         lambda good: replace(
             good, structures=tuple(replace(each, name="x") for each in good.structures)

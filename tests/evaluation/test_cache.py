@@ -37,7 +37,7 @@ def test_what_was_asked_for_stays() -> None:
     cache = filled(3, 3)
     first = cache.get(key(0))
     assert first is not None
-    assert first.module_impulse.tolist() == [0.0]
+    assert first.module_impulse_n_s.tolist() == [0.0]
     cache.add(key(3), first)
     assert kept(cache, 4) == [0, 2, 3]
 
@@ -67,7 +67,7 @@ def test_threads_share_a_cache_of_few_loads() -> None:
         loads = BlastLoads((), np.array([float(seed)]))
         cache.add(key(seed), loads)
         found = cache.get(key(seed))
-        return found is None or found.module_impulse.tolist() == [float(seed)]
+        return found is None or found.module_impulse_n_s.tolist() == [float(seed)]
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(use, [number % 7 for number in range(2000)]))

@@ -18,7 +18,7 @@ from tests.scenarios import BALLISTIC_COURTYARD
 
 def same(one: BlastLoads, other: BlastLoads) -> bool:
     """Whether two loads are equal to the last bit."""
-    modules = np.array_equal(one.module_impulse, other.module_impulse)
+    modules = np.array_equal(one.module_impulse_sim, other.module_impulse)
     return modules and one.structures == other.structures
 
 
@@ -34,7 +34,7 @@ def test_loads_are_those_of_simulate(scenario: Scenario, engine: str) -> None:
     assert building.impulse_pa_s == scaled.pa_s == pytest.approx(6894.757293168 * scaled.psi_s)
     assert (building.in_range, building.notes) == (True, ())
     modules = result.modules[result.modules.structure == "building"]
-    assert loads.module_impulse.tolist() == modules.impulse_sim.tolist()
+    assert loads.module_impulse_sim.tolist() == modules.impulse_sim.tolist()
 
 
 def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluator) -> None:
@@ -56,7 +56,7 @@ def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> 
 
 def test_parallel_and_serial_are_the_same(evaluator: BlastEvaluator) -> None:
     pairs = [(layout, threat) for layout in (FEW, (), WALL) for threat in THREATS[:2]]
-    parallel = BlastEvaluator(COURTYARD)
+    parallel = BlastEvaluator(COURTYARD, "event")
     for one, other in zip(
         parallel.loads_of_many(pairs, processes=2), evaluator.loads_of_many(pairs), strict=True
     ):
@@ -67,7 +67,7 @@ def test_parallel_and_serial_are_the_same(evaluator: BlastEvaluator) -> None:
 
 
 def test_equal_blasts_are_simulated_once() -> None:
-    evaluator = BlastEvaluator(COURTYARD)
+    evaluator = BlastEvaluator(COURTYARD, "event")
     threat = THREATS[0]
     pairs = [(FEW, threat), ((), threat), (FEW[::-1], threat)]
     first, unprotected, again = evaluator.loads_of_many(pairs)
@@ -81,7 +81,7 @@ def test_equal_blasts_are_simulated_once() -> None:
 def test_loads_that_are_given_out_twice_cannot_be_changed(evaluator: BlastEvaluator) -> None:
     for loads in evaluator.loads_of_many([(FEW, threat) for threat in THREATS], processes=2):
         with pytest.raises(ValueError, match="read-only"):
-            loads.module_impulse[0] = 0.0
+            loads.module_impulse_sim[0] = 0.0
 
 
 def protected_impulse(evaluator: BlastEvaluator) -> tuple[float, int]:
@@ -89,7 +89,7 @@ def protected_impulse(evaluator: BlastEvaluator) -> tuple[float, int]:
 
 
 def test_an_evaluator_works_in_a_spawned_process_and_keeps_what_it_remembers() -> None:
-    evaluator = BlastEvaluator(COURTYARD)
+    evaluator = BlastEvaluator(COURTYARD, "event")
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         there, _ = pool.apply(protected_impulse, (evaluator,))
     assert (there, 1) == protected_impulse(evaluator)
@@ -103,13 +103,13 @@ def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:
         BlastEvaluator(Scenario.from_document(document, "bare"))
     other = COURTYARD.with_simulation(overrides={"air": {"mass": 0.5}})
     with pytest.raises(CalibrationError, match="the simulation has others"):
-        BlastEvaluator(other)
+        BlastEvaluator(other, "event")
     with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):
         BlastEvaluator(COURTYARD, engine="pymonk")
 
 
 def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
-    evaluator = BlastEvaluator(COURTYARD)
+    evaluator = BlastEvaluator(COURTYARD, "event")
     with pytest.raises(LayoutError, match=r"\(0, 99\)"):
         evaluator.loads_of_many([((), THREATS[0]), ([(0, 99)], THREATS[0])])
     with pytest.raises(BlastEnvError, match="processes is 0, must be a whole number of at least 1"):
@@ -122,4 +122,4 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
 def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> None:
     inside = [LoadCase(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
     with pytest.raises(ScenarioError, match="building"):
-        BlastEvaluator(COURTYARD).loads_of_many([((), each) for each in inside], processes)
+        BlastEvaluator(COURTYARD, "event").loads_of_many([((), each) for each in inside], processes)

@@ -47,7 +47,7 @@ PUBLIC = (
         lambda it: LayoutFile.of(it, [(1, 1)]),
         lambda it: LayoutFile.of(COURTYARD, [(1, 1)]).layout_for(it),
         lambda it: draw_threats(it, range(3)),
-        lambda it: BlastEvaluator(it).scenario,
+        lambda it: BlastEvaluator(it, "event").scenario,
         lambda it: Evaluators("event").of(it).scenario,
         lambda it: LoadCaseSet(it, (THREAT,)).scenario,
         lambda it: LayoutPlan(it, ((1, 1),)).scenario,

@@ -13,6 +13,13 @@ if TYPE_CHECKING:
         kinds_for,
         only,
     )
+    from blast_env.design.search.by_rule import (
+        Need,
+        ProposerKind,
+        ProposerRow,
+        RuleProposer,
+        layouts_by_rule,
+    )
     from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
     from blast_env.design.search.learnt import Guesses, LearntSearch, improved, search_by
     from blast_env.design.search.methods import (
@@ -31,15 +38,7 @@ if TYPE_CHECKING:
         SamplingAgent,
         SearchResult,
     )
-    from blast_env.design.search.registry import (
-        Need,
-        ProposerKind,
-        ProposerRow,
-        RuleProposer,
-        find_proposer,
-        layouts_by_rule,
-        proposers,
-    )
+    from blast_env.design.search.registry import find_proposer, proposers
     from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
     from blast_env.evaluation import DesignProblem
     from blast_env.geometry import Layout

@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.moves import Moves, legal_part
-from blast_env.design.search.registry import layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError, DesignProblem
 from blast_env.evaluation.questions.verdict import Verdict

@@ -6,8 +6,8 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.design.search.by_rule import rule_layouts
 from blast_env.design.search.moves import Draw, Moves, random_part, random_walls
-from blast_env.design.search.registry import rule_layouts
 from blast_env.design.search.session import Search, SearchSession
 from blast_env.geometry import Layout
 

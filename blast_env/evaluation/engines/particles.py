@@ -315,7 +315,7 @@ class BlastResult:
                 for each in structures
                 for scaled in [self.impulse(each.name, law)]
             ),
-            module_impulse=np.array(impulse, dtype=np.float64),
+            module_impulse_sim=np.array(impulse, dtype=np.float64),
         )
 
     @cached_property

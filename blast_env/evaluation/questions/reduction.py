@@ -473,12 +473,15 @@ class Evaluation:
 
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
-        impulse, without = (
-            np.mean([record.loads.module_impulse for record in self.blasts.records[side]], axis=0)
-            for side in _sides(self.blasts)
-        )
         first = self.blasts.records[self.blasts.judged][0].loads
         name = "impulse_sim" if first.has_particles else "impulse_n_s"
+        impulse, without = (
+            np.mean(
+                [getattr(record.loads, f"module_{name}") for record in self.blasts.records[side]],
+                axis=0,
+            )
+            for side in _sides(self.blasts)
+        )
         values = {
             name: impulse,
             f"unprotected_{name}": without,
