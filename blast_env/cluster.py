@@ -234,7 +234,7 @@ class ClusterBackend(ParallelBackendBase):
             taken = [queue.get()]
             while not queue.empty():
                 taken.append(queue.get())
-            done = [each for each in taken if each is not None]
+            done = [index for index in taken if index is not None]
             is_over = len(done) < len(taken)
             for (future, tell), outcome in zip(done, self._outcomes(done), strict=True):
                 self._under_way.discard(future)

@@ -254,13 +254,13 @@ def described(error: ValidationError) -> str:
     """Return one clause per fault: the key, its value and the bound."""
     details = error.errors(include_url=False)
     clauses = []
-    for each in details[:MOST_CLAUSES]:
-        where = key_path([part if isinstance(part, int) else str(part) for part in each["loc"]])
-        what = shortened(each["msg"].removeprefix("Value error, "), 500)
-        if each["type"] == "missing":
+    for detail in details[:MOST_CLAUSES]:
+        where = key_path([part if isinstance(part, int) else str(part) for part in detail["loc"]])
+        what = shortened(detail["msg"].removeprefix("Value error, "), 500)
+        if detail["type"] == "missing":
             clauses.append(f"{where} is missing")
         else:
-            clauses.append(f"{where} is {value_text(each['input'])}: {what}" if where else what)
+            clauses.append(f"{where} is {value_text(detail['input'])}: {what}" if where else what)
     if len(details) > MOST_CLAUSES:
         clauses.append(f"{len(details) - MOST_CLAUSES} more problems")
     return "; ".join(clauses)

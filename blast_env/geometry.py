@@ -279,7 +279,7 @@ def layout_counts(layout: Iterable[Element], kind: str = "", of: int | None = No
         of: Number in stock.
     """
     elements = tuple(layout)
-    measures = [each.item for each in elements if isinstance(each, Measure)]
+    measures = [element.item for element in elements if isinstance(element, Measure)]
     pieces = standing(elements)
     if measures and not pieces and of is None:
         return ", ".join(measures)
@@ -298,7 +298,7 @@ def layout_words(layout: "Layout") -> str:
 
 def _element_text(element: Element) -> str:
     row, column, *item = element
-    words = [str(each) for each in item[:1]] + ["turned" for each in item[1:] if each]
+    words = [str(element) for element in item[:1]] + ["turned" for element in item[1:] if element]
     return ",".join((f"{row},{column}", *words))
 
 
@@ -328,7 +328,7 @@ def overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
 
 def overlapping_any(rectangles: Sequence[Rectangle], boxes: Boxes) -> BoolArray:
     """Return whether each rectangle overlaps any of some others, at least one."""
-    found: BoolArray = np.any([overlapping(each, boxes) for each in rectangles], axis=0)
+    found: BoolArray = np.any([overlapping(rectangle, boxes) for rectangle in rectangles], axis=0)
     return found
 
 

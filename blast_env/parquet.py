@@ -92,7 +92,7 @@ def read_frame(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
         BlastEnvError: If the file is missing, damaged or no Parquet, or holds another table.
     """
     table = read_apart(str(path), checked_table, path, tuple(columns))
-    names = [each.name for each in columns]
+    names = [column.name for column in columns]
     if table.column_names != names:
         found = shortened(", ".join(table.column_names))
         raise BlastEnvError(f"{path}: has the columns {found}, must have {', '.join(names)}")
@@ -136,9 +136,9 @@ def _check_schema(path: Path, file: pq.ParquetFile, columns: Sequence[Column]) -
     values = file.metadata.num_rows * file.metadata.num_columns
     if values > MOST_VALUES:
         raise BlastEnvError(f"{path}: has {values:,} values, must have at most {MOST_VALUES:,}")
-    known = {each.name: each for each in columns}
-    kinds = {each.name: each.type for each in file.schema_arrow}
-    missing = [each.name for each in columns if each.name not in kinds]
+    known = {column.name: column for column in columns}
+    kinds = {column.name: column.type for column in file.schema_arrow}
+    missing = [column.name for column in columns if column.name not in kinds]
     if missing:
         raise BlastEnvError(f"{path}: has no column {', '.join(missing)}")
     for name, kind in kinds.items():

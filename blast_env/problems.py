@@ -103,7 +103,9 @@ def problems_from(
         prefix: Keys of the validated value in the file.
     """
     details = error.errors(include_url=False)
-    translated = [each for detail in details[:MAX_PROBLEMS] for each in _translated(detail, model)]
+    translated = [
+        problem for detail in details[:MAX_PROBLEMS] for problem in _translated(detail, model)
+    ]
     # The others are only counted, and need no message.
     counted = [Problem(key_path(detail["loc"]), detail["msg"]) for detail in details[MAX_PROBLEMS:]]
     return tuple(problem.below(prefix) for problem in (*translated, *counted))
@@ -123,7 +125,7 @@ def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Proble
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         key = context["discriminator"].strip("'")
         tags = [
-            str(get_args(each.model_fields[key].annotation)[0]) for each in _options(annotation)
+            str(get_args(option.model_fields[key].annotation)[0]) for option in _options(annotation)
         ]
         words = f"{detail['msg']}{suggestion(value.get(key), tags)}"
         if key not in value:

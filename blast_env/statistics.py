@@ -189,7 +189,7 @@ AnyPart = TypeVar("AnyPart", bound=_Part)
 
 def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
     """Return the parts whose loads make up a building's load: the protected ones, or else all."""
-    return [each for each in parts if each.protected] or parts
+    return [part for part in parts if part.protected] or parts
 
 
 def mean_over_area(load: FloatArray, area: FloatArray) -> float:

@@ -163,7 +163,7 @@ class _Sheets:
 
     def add_whole(self, name: str, table: pd.DataFrame, columns: Sequence[Column]) -> None:
         """Add a table on one sheet: headings with units and notes, formats, widths, a filter."""
-        shown = pd.DataFrame({each.name: readable(table[each.name]) for each in columns})
+        shown = pd.DataFrame({column.name: readable(table[column.name]) for column in columns})
         sheet = self._write(name, shown)
         lines = 1
         for index, column in enumerate(columns):
@@ -280,9 +280,9 @@ def _heading_width(text: str) -> int:
 def _explanations(tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]) -> SheetTable:
     """Return a table of the meanings of every column and every unit."""
     rows = [
-        (each.name, header(column), column.unit, column.meaning)
-        for each in tables
-        for column in each.columns
+        (table.name, header(column), column.unit, column.meaning)
+        for table in tables
+        for column in table.columns
     ]
     rows += [("", "", unit, meaning) for unit, meaning in units]
     names = [column.name for column in _EXPLANATION_COLUMNS]

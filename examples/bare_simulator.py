@@ -16,5 +16,5 @@ print({key: value for key, value in info.items() if isinstance(value, int | floa
 result = blast_env.simulate("courtyard", layout=WALL, engine="event")  # the same in one call
 print(result.collisions.head())
 unprotected = blast_env.simulate("courtyard", engine="event")
-walled_pa_s, bare_pa_s = (each.impulse("building").pa_s for each in (result, unprotected))
+walled_pa_s, bare_pa_s = (outcome.impulse("building").pa_s for outcome in (result, unprotected))
 print(f"two modules take {1.0 - walled_pa_s / bare_pa_s:.1%} off {bare_pa_s:.0f} Pa s")

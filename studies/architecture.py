@@ -53,7 +53,9 @@ def rooms() -> list[Room]:
     if not configuration.exists():
         raise BlastEnvError(f"{configuration}: does not exist: the picture needs a checkout")
     contracts = tomllib.loads(configuration.read_text(encoding="utf-8"))["tool"]["importlinter"]
-    layers = next(each["layers"] for each in contracts["contracts"] if "containers" in each)
+    layers = next(
+        contract["layers"] for contract in contracts["contracts"] if "containers" in contract
+    )
     names = [name.strip() for layer in layers for name in layer.split("|")]
     return [_room(name) for name in names if (PACKAGE / name).is_dir()]
 

@@ -151,7 +151,7 @@ def street(length_m: float) -> Scenario:
     def solid(
         name: str, box_m: tuple[float, float, float, float], height_m: float, *, protected: bool
     ) -> dict[str, Any]:
-        left_m, bottom_m, width_m, depth_m = (whole_m(each) for each in box_m)
+        left_m, bottom_m, width_m, depth_m = (whole_m(side_m) for side_m in box_m)
         return {
             "kind": "ModularObstacle",
             "name": name,
@@ -357,16 +357,16 @@ def _processor() -> str:
 def _print_blasts(costs: Sequence[BlastCost], repeats: int) -> None:
     rows = [
         (
-            each.scenario,
-            each.engine,
-            f"{MS_PER_S * each.simulated_s:.0f}",
-            f"{each.steps:,}",
-            f"{MS_PER_S * each.cpu_s:.1f}",
-            f"{1.0 / each.cpu_s:.2f}",
-            "-" if each.cell_updates is None else f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
-            "-" if each.memory_mb is None else f"{each.memory_mb:.0f}",
+            cost.scenario,
+            cost.engine,
+            f"{MS_PER_S * cost.simulated_s:.0f}",
+            f"{cost.steps:,}",
+            f"{MS_PER_S * cost.cpu_s:.1f}",
+            f"{1.0 / cost.cpu_s:.2f}",
+            "-" if cost.cell_updates is None else f"{1e-6 * cost.cell_updates / cost.cpu_s:.1f}",
+            "-" if cost.memory_mb is None else f"{cost.memory_mb:.0f}",
         )
-        for each in costs
+        for cost in costs
     ]
     if rows:
         print_table(f"a blast: medians of {repeats} seeds", _BLAST_HEADERS, rows, 2)
@@ -384,7 +384,7 @@ def _print_environments(
             except BlastEnvError as error:
                 left_out.append(f"{scenario.name}, {engine}: no environment: {error}")
                 break
-            milliseconds = (f"{MS_PER_S * each:.1f}" for each in (cost.episode_s, cost.placing_s))
+            milliseconds = (f"{MS_PER_S * item:.1f}" for item in (cost.episode_s, cost.placing_s))
             rows.append(
                 (
                     *(scenario.name, engine, observation, str(cost.steps), *milliseconds),
@@ -414,27 +414,27 @@ def _sites(names: Sequence[str], lengths_m: Sequence[float]) -> Iterator[Scenari
 
 def _print_sites(sites: Sequence[Scenario], cells: Sequence[str]) -> None:
     pairs = [
-        (scenario, GasEngine(cells=each))
+        (scenario, GasEngine(cells=cell))
         for scenario in sites
-        for each in cells or CELLS
-        if each != UNIFORM or scenario.site.width_m <= _LONGEST_UNIFORM_M
+        for cell in cells or CELLS
+        if cell != UNIFORM or scenario.site.width_m <= _LONGEST_UNIFORM_M
     ]
     rows = []
     with progress_bar("blasts") as progress:
         for scenario, engine in pairs:
-            each = site_cost(scenario, engine)
+            cost = site_cost(scenario, engine)
             rows.append(
                 (
-                    each.site,
-                    each.cells,
-                    f"{each.estimate.cells:,}",
-                    f"{each.estimate.steps:,}",
-                    f"{each.steps:,}",
-                    f"{each.estimate.seconds:.1f}",
-                    f"{each.cpu_s:.1f}",
-                    f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
-                    f"{1e-6 * each.estimate.memory_bytes:.0f}",
-                    f"{each.memory_mb:.0f}",
+                    cost.site,
+                    cost.cells,
+                    f"{cost.estimate.cells:,}",
+                    f"{cost.estimate.steps:,}",
+                    f"{cost.steps:,}",
+                    f"{cost.estimate.seconds:.1f}",
+                    f"{cost.cpu_s:.1f}",
+                    f"{1e-6 * cost.cell_updates / cost.cpu_s:.1f}",
+                    f"{1e-6 * cost.estimate.memory_bytes:.0f}",
+                    f"{cost.memory_mb:.0f}",
                 )
             )
             progress(len(rows) / len(pairs))
@@ -443,7 +443,7 @@ def _print_sites(sites: Sequence[Scenario], cells: Sequence[str]) -> None:
 
 
 def _print_ratios(older: Path, names: Sequence[str], turns: int) -> None:
-    unknown = [each for each in names if each not in ROWS]
+    unknown = [name for name in names if name not in ROWS]
     if unknown:
         raise UnknownNameError("row", unknown[0], list(ROWS))
     if not (older / "blast_env" / "__init__.py").is_file():
@@ -457,7 +457,7 @@ def _print_ratios(older: Path, names: Sequence[str], turns: int) -> None:
                 rows.append(
                     (
                         *(found.row.title, found.row.unit),
-                        *(f"{1.0 / each:,.4g}" for each in (old_s, new_s)),
+                        *(f"{1.0 / item:,.4g}" for item in (old_s, new_s)),
                         f"{found.ratio:.2f}",
                         f"{min(found.ratios):.2f} to {max(found.ratios):.2f}",
                     )
@@ -526,14 +526,14 @@ def main(
             print_line(hardware())
             _print_sites(sites, cells or ())
             return
-        scenarios = [load_scenario(each) for each in scenario or ("courtyard",)]
-        engines = [find_engine(each).name for each in engine or ENGINE_NAMES]
+        scenarios = [load_scenario(name) for name in scenario or ("courtyard",)]
+        engines = [find_engine(engine_name).name for engine_name in engine or ENGINE_NAMES]
         print_line(hardware())
-        pairs = [(each, name) for each in scenarios for name in engines]
+        pairs = [(scenario, name) for scenario in scenarios for name in engines]
         costs: list[BlastCost] = []
         with progress_bar("blasts") as progress:
-            for each, name in (pair for pair in pairs if find_engine(pair[1]).medium):
-                costs.append(blast_cost(each, name, repeats, memory=memory))
+            for item, name in (pair for pair in pairs if find_engine(pair[1]).medium):
+                costs.append(blast_cost(item, name, repeats, memory=memory))
                 progress(len(costs) / len(pairs))
         _print_blasts(costs, repeats)
         if environment:

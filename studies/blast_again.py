@@ -58,7 +58,7 @@ def asked_in(
     for number, (name, rows) in enumerate(islice(table.groupby("scenario", sort=False), sites)):
         blasts = list(dict.fromkeys(map(_blast, rows.to_dict("records"))))
         order = np.random.default_rng(number).permutation(len(blasts))
-        drawn = sorted((blasts[each] for each in order), key=lambda blast: len(blast[0]) > 0)
+        drawn = sorted((blasts[index] for index in order), key=lambda blast: len(blast[0]) > 0)
         found.append(SiteBlasts(str(name), tuple(drawn[:layouts])))
     return found
 
@@ -77,7 +77,10 @@ def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[st
     for layout, charge in asked.blasts:
         threat = LoadCase(charge, 0)
         loads, key = evaluator.loads(layout, threat), evaluator.key(layout, threat)
-        rows += [load_row({key.scenario_hash: asked.name}, key, each) for each in loads.structures]
+        rows += [
+            load_row({key.scenario_hash: asked.name}, key, structure)
+            for structure in loads.structures
+        ]
     return rows
 
 
@@ -101,7 +104,7 @@ def main(
             asked = asked_in(read_frame(path, COLUMNS), layouts, sites)
             with progress_bar(path.stem) as progress:
                 rows: Sequence[list[dict[str, object]]] = run_all(run, asked, processes, progress)
-            blasts = sum(len(each.blasts) for each in asked)
+            blasts = sum(len(name.blasts) for name in asked)
             table = table_of([row for own in rows for row in own], COLUMNS)
             write_table(table, COLUMNS, {"blasts": blasts, **versions()}, out / path.name)
             print_line(f"{blasts:,} blasts on {len(asked):,} sites; wrote {out / path.name}")

@@ -113,14 +113,14 @@ def front_only(site: Scenario, one_wall: bool) -> Scenario:
     (threat,) = draw_threats(site, [0])
     place_m = np.array(threat.charge_against(site, ()).position_m)
     structures = []
-    for each in site.structures:
-        left, bottom, right, top = each.rectangle_m
+    for structure in site.structures:
+        left, bottom, right, top = structure.rectangle_m
         way_m = place_m - np.clip(place_m, (left, bottom), (right, top))
-        seen_m = {face: float(way_m @ OUTWARDS[face]) for face in each.faces}
+        seen_m = {face: float(way_m @ OUTWARDS[face]) for face in structure.faces}
         most_m = max(seen_m.values())
         least_m = most_m if one_wall else min(most_m, _LEAST_SEEN_M)
         faces = tuple(face for face, far_m in seen_m.items() if far_m >= least_m)
-        structures.append(each.model_copy(update={"faces": faces}))
+        structures.append(structure.model_copy(update={"faces": faces}))
     return site.model_copy(update={"structures": tuple(structures)})
 
 
@@ -154,7 +154,9 @@ def main(
             if not folder.is_dir():
                 raise BlastEnvError(f"{folder}: is no folder of blasts")
             for key, loads in BlastStore(folder).items():
-                rows[json.dumps(key)] = [load_row(names, key, each) for each in loads.structures]
+                rows[json.dumps(key)] = [
+                    load_row(names, key, structure) for structure in loads.structures
+                ]
         if not rows:
             raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")
         table = table_of([row for own in rows.values() for row in own], COLUMNS)

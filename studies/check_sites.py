@@ -189,9 +189,9 @@ def main(
         run_by = find_engine(engine or ("event" if family == SITES else "gas"))
         of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
         if picture is not None:
-            first = [each[-1] for each in of_seeds[:12]]
+            first = [seed[-1] for seed in of_seeds[:12]]
             print_line(f"wrote {save_figure(contact_sheet(first), picture)}")
-        asked = of_seeds if rejected else [each[-1:] for each in of_seeds]
+        asked = of_seeds if rejected else [seed[-1:] for seed in of_seeds]
         drawn = [site for of_seed in asked for site in of_seed]
         measure = partial(
             measured,
@@ -202,15 +202,15 @@ def main(
         )
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)
-        print_measured([each for each in results if each.accepted])
+        print_measured([result for result in results if result.accepted])
         print_agreement(results)
 
 
 def print_measured(results: Sequence[MeasuredSite]) -> None:
     """Print the results of blasts on the sites that the criterion accepts."""
-    reduction = np.array([each.reduction for each in results])
+    reduction = np.array([result.reduction for result in results])
     columns = {
-        "unprotected impulse (Pa s)": np.array([each.unprotected_pa_s for each in results]),
+        "unprotected impulse (Pa s)": np.array([result.unprotected_pa_s for result in results]),
         "reduction by random layouts, mean (%)": 100.0 * reduction[:, 1:].mean(axis=1),
         f"by the best of {reduction.shape[1] - 1} (%)": 100.0 * reduction[:, 1:].max(axis=1),
         "by the visibility layout (%)": 100.0 * reduction[:, 0],
@@ -228,11 +228,11 @@ def print_measured(results: Sequence[MeasuredSite]) -> None:
 
 def print_agreement(results: Sequence[MeasuredSite]) -> None:
     """Print the agreement between lines of sight and blasts."""
-    faults = ("", *dict.fromkeys(each.fault for each in results if each.fault))
+    faults = ("", *dict.fromkeys(result.fault for result in results if result.fault))
     print_row("by lines of sight", *(fault or "worth solving by blasts" for fault in faults))
     print_line("|---" * (1 + len(faults)) + "|")
     for label, accepted in (("accepted", True), ("rejected", False)):
-        found = [each.fault for each in results if each.accepted is accepted]
+        found = [result.fault for result in results if result.accepted is accepted]
         print_row(label, *(str(found.count(fault)) for fault in faults))
 
 

@@ -138,7 +138,7 @@ class CorrectedReward:
         """Take in the blasts of a layout."""
         self.reduction[layout] = reduction
         self._errors[layout] = log((1.0 - reduction) / (1.0 - guessed))
-        barriers = [self.site.barrier(each) for each in self._errors]
+        barriers = [self.site.barrier(error) for error in self._errors]
         self._correction = Correction.of(barriers, np.array([*self._errors.values()]))
 
 
@@ -197,7 +197,7 @@ class DemoTraining:
     @property
     def best(self) -> Layout:
         """The best layout of the policy by the blasts so far."""
-        return max(self.reward.reduction, key=lambda each: self.reward.reduction[each])
+        return max(self.reward.reduction, key=lambda item: self.reward.reduction[item])
 
     def do_round(self) -> None:
         """Train on corrected guesses, then blast the proposal and the best draws."""
@@ -205,8 +205,8 @@ class DemoTraining:
         proposal = self._layout(deterministic=True)
         drawn = dict(self._layout(deterministic=False) for _ in range(self.settings.draws))
         known = {*self.reward.reduction, proposal[0]}
-        new = [each for each in drawn.items() if each[0] not in known]
-        new.sort(key=lambda each: -self.reward.corrected(*each))
+        new = [draw for draw in drawn.items() if draw[0] not in known]
+        new.sort(key=lambda draw: -self.reward.corrected(*draw))
         self._blast([proposal, *new[: self.settings.blasted - 1]], 1)
 
     def _layout(self, *, deterministic: bool) -> tuple[Layout, float]:
@@ -222,11 +222,11 @@ class DemoTraining:
 
     def _blast(self, layouts: Sequence[tuple[Layout, float]], shown: int) -> None:
         """Blast layouts, each with its guess; the curve gets the means of the first ones."""
-        promised = np.mean([self.reward.corrected(*each) for each in layouts[:shown]]).item()
+        promised = np.mean([self.reward.corrected(*layout) for layout in layouts[:shown]]).item()
         for layout, guessed in layouts:
             judged = compare(self._judge, [self._case], [layout], self.settings.processes)
             self.reward.learn(layout, guessed, judged.reduction.value)
-        by_gas = np.mean([self.reward.reduction[each] for each, _ in layouts[:shown]]).item()
+        by_gas = np.mean([self.reward.reduction[name] for name, _ in layouts[:shown]]).item()
         self.curve.append((self.model.num_timesteps, by_gas, promised))
 
 
@@ -304,10 +304,10 @@ class AgentComparison:
     def verdict(self) -> str:
         """The reduction and cost of the layout, and its lead over rules and random layouts."""
         others = self.results[RANDOM], self.results[self.best_rule], self.best_rule_each
-        leads = [self.agent.difference(each).scaled(100.0) for each in others]
+        leads = [self.agent.difference(other).scaled(100.0) for other in others]
         if isnan(leads[0].low):
             return "No verdict: one charge gives no interval."
-        random, rule, each = (
+        random, rule, best_of_each = (
             f"{lead.value:+.1f} points ({lead.low:+.1f} to {lead.high:+.1f})" for lead in leads
         )
         scenario, reduction = self.agent.cases[0].scenario, self.agent.reduction
@@ -317,15 +317,15 @@ class AgentComparison:
         return (
             f"The layout takes off {percent(reduction.value)} of the load ({interval(reduction)}) "
             f"and costs {cost:g}{budget}. It {ahead} of the rules: {rule} beside the best one, "
-            f"{self.best_rule!r}, {each} beside the best for each charge, {random} beside "
+            f"{self.best_rule!r}, {best_of_each} beside the best for each charge, {random} beside "
             "random layouts (95 % intervals of paired differences)."
         )
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the printed table, one row per method; see `HEADERS`."""
-        others = {name: each for name, each in self.results.items() if name != AGENT}
+        others = {name: result for name, result in self.results.items() if name != AGENT}
         others |= {"best rule for each case": self.best_rule_each, AGENT: self.agent}
-        return [self._row(name, each) for name, each in others.items()]
+        return [self._row(name, other) for name, other in others.items()]
 
     def _row(self, name: str, result: Evaluation) -> tuple[str, ...]:
         ahead = self.agent.difference(result)
@@ -342,7 +342,7 @@ def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[LoadCaseS
     """Return a case for each mass of the judgement, with one threat for each place."""
     count, cases = len(one_of_each_charge(draw_threats(scenario, range(16)))), []
     for index, tnt_kg in enumerate(settings.masses_kg):
-        charge = tuple(each.model_copy(update={"tnt_kg": tnt_kg}) for each in scenario.charge)
+        charge = tuple(source.model_copy(update={"tnt_kg": tnt_kg}) for source in scenario.charge)
         site = scenario.model_copy(update={"charge": charge})
         threats = draw_threats(site, SeedRange.TEST.seeds(count * index, count))
         cases.append(LoadCaseSet(site, threats, name=f"{tnt_kg:g} kg", seed=index))
@@ -352,11 +352,11 @@ def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[LoadCaseS
 def compare_methods(settings: DemoSettings, training: DemoTraining) -> AgentComparison:
     """Compare the best layout of the training with all rules under unseen charges."""
     cases = unseen_charges(settings, training.scenario)
-    rules = [layouts_by_rule(each.scenario) for each in cases]
+    rules = [layouts_by_rule(case.scenario) for case in cases]
     layouts: dict[str, list[Layout]] = {
         NOTHING: [()] * len(cases),
-        RANDOM: [random_layout(each.scenario, generator(each.seed)) for each in cases],
-        **{name: [each[name] for each in rules] for name in rules[0]},
+        RANDOM: [random_layout(case.scenario, generator(case.seed)) for case in cases],
+        **{name: [rule[name] for rule in rules] for name in rules[0]},
         AGENT: [training.best] * len(cases),
     }
     evaluators, results = Evaluators(JUDGE, most=len(cases)), {}
@@ -409,7 +409,7 @@ def print_comparison(comparison: AgentComparison) -> None:
     """Print one row per method: mean load, reduction, lead of the agent."""
     cases = comparison.agent.cases
     title = (
-        f"{cases[0].scenario.name}: charges of {', '.join(each.name for each in cases)}, which the "
+        f"{cases[0].scenario.name}: charges of {', '.join(case.name for case in cases)}, which the "
         f"training has not met; judged by the engine {comparison.engine}"
     )
     print_table(title, HEADERS, comparison.rows())
@@ -428,7 +428,10 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
     """
     case, layout = comparison.agent.cases[0], comparison.agent.layouts[0]
     scenario, threat, out = case.scenario, case.threats[0], settings.out
-    blasts = [GasBlast(scenario, each, threat.seed, charge=threat.charge) for each in ((), layout)]
+    blasts = [
+        GasBlast(scenario, layout_tried, threat.seed, charge=threat.charge)
+        for layout_tried in ((), layout)
+    ]
     film = out / "side_by_side.mp4"
     with progress_bar("film") as progress:
         unprotected, protected = write_film(

@@ -69,11 +69,11 @@ class Agreement:
     def is_close(self) -> bool:
         """Whether both intervals lie within `CLOSE`."""
         both = (self.impulse, self.transferred)
-        return all(max(-each.low, each.high) < CLOSE for each in both)
+        return all(max(-estimate.low, estimate.high) < CLOSE for estimate in both)
 
     def cells(self) -> tuple[str, ...]:
         """Return the row of the table; see `HEADERS`."""
-        shares = (each.scaled(100.0) for each in (self.impulse, self.transferred))
+        shares = (column.scaled(100.0) for column in (self.impulse, self.transferred))
         differences = (f"{s.value:+.1f} % ({s.low:+.1f} to {s.high:+.1f})" for s in shares)
         close = "within 5 %" if self.is_close else ""
         return self.scene, f"{self.step_radii:g}", *differences, close
@@ -101,7 +101,7 @@ def agreements(
             stepped = scenario.with_simulation(overrides={"stepping": {"step_radii": step_radii}})
             label = f"{name}: pymunk, {step_radii:g} radii"
             pymunk = _loads(stepped, "pymunk", seeds, processes, label)
-            columns = (relative_difference(*each) for each in zip(pymunk.T, event.T, strict=True))
+            columns = (relative_difference(*item) for item in zip(pymunk.T, event.T, strict=True))
             yield Agreement(name, step_radii, *columns)
 
 
@@ -130,7 +130,9 @@ def main(
             if scene not in scenes:
                 raise BlastEnvError(f"--scene is {scene!r}, must be one of {', '.join(scenes)}")
             scenes = {scene: scenes[scene]}
-        found = [each.cells() for each in agreements(scenes, seeds, processes, STEPS_RADII)]
+        found = [
+            agreement.cells() for agreement in agreements(scenes, seeds, processes, STEPS_RADII)
+        ]
     print_line(markdown_table(HEADERS, found))
 
 

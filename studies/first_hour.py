@@ -26,7 +26,9 @@ HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
 
 Agent = PPO | MaskablePPO
-KNOWN: Final[dict[str, type[Agent]]] = {each.__name__: each for each in (PPO, MaskablePPO)}
+KNOWN: Final[dict[str, type[Agent]]] = {
+    algorithm.__name__: algorithm for algorithm in (PPO, MaskablePPO)
+}
 
 
 def environment(
@@ -82,8 +84,8 @@ def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, 
             env.reset(seed=seed, options={"layout": layout})
             *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
             found.setdefault(name, []).append(info["reduction"])
-    for name, each in found.items():
-        yield name, np.array(each)
+    for name, item in found.items():
+        yield name, np.array(item)
 
 
 def report(name: str, of_episodes: FloatArray, best: FloatArray | None = None) -> None:
@@ -120,9 +122,9 @@ def main(
             print_line(f"judged by {engine} on {len(judged)} threats")
             judge = environment(action, engine, cache=cache if engine == "gas" else None)
             rules = dict(by_rules(judge, judged))
-            best = max(rules.values(), key=lambda each: float(each.mean()))
-            for name, each in rules.items():
-                report(name, each)
+            best = max(rules.values(), key=lambda rule: float(rule.mean()))
+            for name, rule in rules.items():
+                report(name, rule)
             report("the nearest row again and again", reductions(judge, 0, judged), best)
             if engine == "event":
                 report("random", reductions(environment("place"), None, judged))

@@ -169,9 +169,9 @@ class Plate:
         self, coefficients: FloatArray, pushed: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the residual of the equation of w, and its derivative."""
-        w = [coefficients @ each for each in self._bending[1:]]
+        w = [coefficients @ segment for segment in self._bending[1:]]
         stress_function = self._stress_function(coefficients)
-        f = [stress_function @ each for each in self._membrane[1:]]
+        f = [stress_function @ segment for segment in self._membrane[1:]]
         basis = self._bending[0]
         residual = self._stiffness @ coefficients - pushed
         residual -= basis @ (self._weights * _bracket(w, f))
@@ -183,14 +183,14 @@ class Plate:
         return residual, tangent
 
     def _stress_function(self, coefficients: FloatArray) -> FloatArray:
-        w = [coefficients @ each for each in self._bending[1:]]
+        w = [coefficients @ segment for segment in self._bending[1:]]
         source: FloatArray = self._membrane[0] @ (self._weights * _bracket(w, w))
         return -0.5 * self._compliance @ source
 
     def _state(self, coefficients: FloatArray, load: float) -> PlateState:
-        w, w_xx, w_yy, w_xy = (coefficients @ each for each in self._bending)
+        w, w_xx, w_yy, w_xy = (coefficients @ segment for segment in self._bending)
         stress_function = self._stress_function(coefficients)
-        _, f_xx, f_yy, f_xy = (stress_function @ each for each in self._membrane)
+        _, f_xx, f_yy, f_xy = (stress_function @ segment for segment in self._membrane)
         factor = -0.5 / (1.0 - POISSON_RATIO**2)
         bent = np.array(
             [
@@ -302,7 +302,7 @@ def table_text() -> str:
     ]
     for ratio in ASPECT_RATIOS:
         for deflection, row in zip(DEFLECTIONS, curve_values(ratio), strict=True):
-            lines.append(",".join(f"{each:.6g}" for each in (ratio, deflection, *row)))
+            lines.append(",".join(f"{value:.6g}" for value in (ratio, deflection, *row)))
     return "\n".join(lines) + "\n"
 
 

@@ -239,7 +239,7 @@ def component_rows(found: dict[float, FacadeResponse], tnt_kg: float) -> Iterato
         levels = []
         for cell_m in cells:
             facade = found[cell_m]
-            bays = filled_with([each.bay for each in facade.bays], name)
+            bays = filled_with([bay.bay for bay in facade.bays], name)
             histories = facade.time_s, facade.pressure_pa
             own = respond(bays, *histories).level_of_protection
             sharper = peak_corrected(*histories, peak_factor(cell_m, tnt_kg))
@@ -265,7 +265,7 @@ def angle_rows(width_m: float) -> Iterator[Row]:
     loads = GasBlast(site, engine=GasEngine(cell_m=0.5)).run().bay_loads
     gas_pa_s = dict(
         zip(
-            (each.bay.name for each in loads.bays),
+            (bay.bay.name for bay in loads.bays),
             impulses(*loads.histories).max(axis=1).tolist(),
             strict=True,
         )
@@ -273,15 +273,15 @@ def angle_rows(width_m: float) -> Iterator[Row]:
     found = screen(site).threats[0]
     count = round(width_m / BAY_M)
     lowest = found.bays[:count]
-    for each in lowest[count // 2 :: 2]:
-        bay = each.filled.bay
+    for load in lowest[count // 2 :: 2]:
+        bay = load.filled.bay
         aside_m = 0.5 * (bay.left_m + bay.right_m) - found.charge.position_m[1]
         own = gas_pa_s[bay.name]
         yield (
             f"{degrees(atan2(aside_m, 20.0)):.0f} degrees",
             f"{own:.0f}",
-            f"{each.impulse_pa_s:.0f}",
-            f"{own / each.impulse_pa_s:.2f}",
+            f"{load.impulse_pa_s:.0f}",
+            f"{own / load.impulse_pa_s:.2f}",
         )
 
 
@@ -302,7 +302,7 @@ def raised_rows(distance_m: float, heights_m: Sequence[float], cell_m: float) ->
         site = open_wall(distance_m, 12.0, 7.0, RAISED_KG, height_m)
         loads = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().bay_loads
         bay = screen(site).threats[0].bays[1]
-        index = [each.bay.name for each in loads.bays].index(bay.filled.bay.name)
+        index = [bay.bay.name for bay in loads.bays].index(bay.filled.bay.name)
         time_s, pressure_pa = loads.histories
         gas_pa_s = float(impulses(time_s, pressure_pa[index : index + 1]).max())
         peaks = float(pressure_pa[index].max()), bay.peak_pa
@@ -341,7 +341,7 @@ def slanting_rows(distance_m: float, tnt_kg: float, cell_m: float) -> Iterator[R
         yield (
             f"{angle_deg[index]:.0f} degrees",
             f"{1e-3 * float(incident):.0f}",
-            *(f"{each:.2f}" for each in (gas, theory, rule)),
+            *(f"{column:.2f}" for column in (gas, theory, rule)),
         )
 
 
@@ -366,17 +366,17 @@ def cells(
     """Print the effect of the cells on the response: 30 kg on the ground, 22 m from a wall."""
     with user_errors():
         site = open_wall(OPEN_M, 6.0, 3.5, OPEN_KG)
-        sides_m = [each for each in (0.5, 0.25, 0.125) if each >= finest]
+        sides_m = [value for value in (0.5, 0.25, 0.125) if value >= finest]
         found = {}
         with progress_bar("cells") as progress:
             for number, cell_m in enumerate(sides_m, start=1):
                 found[cell_m] = facade_on(site, cell_m)
                 progress(number / len(sides_m))
-        bays = [each.bay for each in found[sides_m[0]].bays]
+        bays = [bay.bay for bay in found[sides_m[0]].bays]
         reference_pa = reflected_peaks_pa(bays, OPEN_M, OPEN_KG, 7.0)
         headers = ("cells", "peak over the curve", "allowed for", "impulse over the finest")
         print_line(markdown_table(headers, peak_rows(found, reference_pa)))
-        words = [f"{each:g} m" for each in sides_m]
+        words = [f"{side_m:g} m" for side_m in sides_m]
         print_line("\n" + markdown_table(("period", *words), period_rows(found)))
         levels = markdown_table(("component", *words), component_rows(found, OPEN_KG))
         print_line("\nlevel of protection, in brackets if sharper peaks make it worse\n\n" + levels)
@@ -400,10 +400,10 @@ def raised(
 ) -> None:
     """Print loads of a charge above the ground on a wall, by gas and by screening: 20 kg."""
     with user_errors():
-        at_m, up_m = ([float(each) for each in text.split(",")] for text in (distances, heights))
+        at_m, up_m = ([float(word) for word in text.split(",")] for text in (distances, heights))
         headers = ("wall at", "charge at", "gas, Pa s", "screening, Pa s", "gas over screening")
         peaks = ("peak over that on the ground, gas", "screening")
-        rows = [row for each in at_m for row in raised_rows(each, up_m, cell)]
+        rows = [row for coordinate_m in at_m for row in raised_rows(coordinate_m, up_m, cell)]
         print_line(markdown_table((*headers, *peaks), rows))
 
 

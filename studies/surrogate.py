@@ -133,7 +133,7 @@ class Recipe:
         ruled = list(dict.fromkeys(layouts_by_rule(site).values()))
         found: list[Layout] = [(), *ruled]
         if self.rules < len(ruled):
-            found = [(), *(ruled[each] for each in rng.permutation(len(ruled))[: self.rules])]
+            found = [(), *(ruled[index] for index in rng.permutation(len(ruled))[: self.rules])]
         for number in range(self.layouts):
             if number % 4 == 0 or not ruled:
                 found.append(random_layout(site, rng))
@@ -148,7 +148,7 @@ class Recipe:
             guesses = Guesses.of(self.surrogate, LoadCaseSet(site, (threat,), charge=threat.charge))
             liked = improved(guesses, [(), *ruled], self.changes, rng)
             found += liked[: _EVERY * self.favourites : _EVERY]
-        return list(dict.fromkeys(tuple(sorted(each)) for each in found))
+        return list(dict.fromkeys(tuple(sorted(layout)) for layout in found))
 
 
 def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: Path) -> int:
@@ -158,7 +158,7 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: 
     seed = int(name.rpartition("/")[-1])
     for threat in draw_threats(site, range(threats)):
         tried = recipe.of(site, threat, seed)
-        evaluator.loads_of_many([(each, threat) for each in tried])
+        evaluator.loads_of_many([(layout, threat) for layout in tried])
     return evaluator.counts.blasts
 
 
@@ -202,7 +202,7 @@ def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFra
 def samples_of(rows: pd.DataFrame) -> Samples:
     """Return the training samples of the rows of a blast table."""
     scenarios = [scenario_of(name) for name in rows["scenario"].unique()]
-    return Samples.of(rows, {each.content_hash: each for each in scenarios})
+    return Samples.of(rows, {scenario.content_hash: scenario for scenario in scenarios})
 
 
 @app.command()
@@ -232,7 +232,7 @@ def calibrate(
         with progress_bar("fits") as progress:
             found = run_all(fold, held_out, processes, progress)
         impulse, peak = (
-            HeldOut.of(samples, loads, held_out, [each[index] for each in found])
+            HeldOut.of(samples, loads, held_out, [result[index] for result in found])
             for index, loads in enumerate((samples.impulse, samples.peak))
         )
         sites = f"{len(np.unique(samples.site))} held-out sites"
@@ -350,14 +350,14 @@ def _errors_table(found: Mapping[str, LoadErrors]) -> str:
     rows = [
         (
             f"{load} on {sites}",
-            f"{each.rms:.3f}",
-            f"{each.within:.3f}",
-            str(each.cases),
-            f"{each.rank:.2f}",
-            f"{100.0 * each.lost:.1f} points",
+            f"{quantity.rms:.3f}",
+            f"{quantity.within:.3f}",
+            str(quantity.cases),
+            f"{quantity.rank:.2f}",
+            f"{100.0 * quantity.lost:.1f} points",
         )
         for sites, both in found.items()
-        for load, each in (("impulse", both.impulse), ("peak", both.peak))
+        for load, quantity in (("impulse", both.impulse), ("peak", both.peak))
     ]
     headers = (
         "",
@@ -411,18 +411,18 @@ def verdict(
 
 
 def _verdict_row(name: str, found: list[LayoutsJudged]) -> tuple[str, ...]:
-    names = set.intersection(*(set(each.rules) for each in found))
-    single = max(names, key=lambda rule: fmean(each.rules[rule] for each in found))
+    names = set.intersection(*(set(site.rules) for site in found))
+    single = max(names, key=lambda rule: fmean(site.rules[rule] for site in found))
     percent = (
-        fmean(each.reduction for each in found),
-        fmean(each.promised for each in found),
-        fmean(max(each.rules.values()) for each in found),
+        fmean(site.reduction for site in found),
+        fmean(site.promised for site in found),
+        fmean(max(site.rules.values()) for site in found),
     )
     return (
         name,
-        *(f"{100.0 * each:.1f} %" for each in percent),
-        f"{100.0 * fmean(each.rules[single] for each in found):.1f} % ({single})",
-        f"{median(each.ms for each in found):.0f}",
+        *(f"{100.0 * share:.1f} %" for share in percent),
+        f"{100.0 * fmean(site.rules[single] for site in found):.1f} % ({single})",
+        f"{median(site.ms for site in found):.0f}",
     )
 
 
@@ -466,11 +466,13 @@ def reductions_of(
     evaluator: BlastEvaluator, case: LoadCaseSet, layouts: Sequence[Layout], processes: int
 ) -> list[float]:
     """Return the share by which each layout lowers the case's load, by gas dynamics."""
-    asked = [(each, threat) for each in ((), *layouts) for threat in case.threats]
+    asked = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
     loads = evaluator.loads_of_many(asked, processes)
-    values = np.array([each.load(case.scenario.objective) for each in loads])
-    unprotected, *own = (case.combined(each) for each in values.reshape(-1, len(case.threats)))
-    return [float(each) for each in reductions(np.array(own), np.full(len(own), unprotected))]
+    values = np.array([load.load(case.scenario.objective) for load in loads])
+    unprotected, *own = (case.combined(item) for item in values.reshape(-1, len(case.threats)))
+    return [
+        float(reduction) for reduction in reductions(np.array(own), np.full(len(own), unprotected))
+    ]
 
 
 if __name__ == "__main__":

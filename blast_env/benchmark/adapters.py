@@ -91,7 +91,7 @@ def mcbo_task(problem: BenchmarkProblem) -> Any:
         def keys(self, row: Any) -> FloatArray:
             """Return the random keys of a row of the search space."""
             return np.array(
-                [(int(each) + 0.5) / sizes[index % 3] for index, each in enumerate(row)]
+                [(int(item) + 0.5) / sizes[index % 3] for index, item in enumerate(row)]
             )
 
         def get_search_space_params(self) -> list[dict[str, Any]]:

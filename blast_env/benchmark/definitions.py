@@ -42,7 +42,9 @@ _JUDGED_UNSEEN: Final = 2
 _DRAWS: Final = 16
 """Draws that find every place where the site has only a few."""
 
-_GENERATED: Final = MappingProxyType({"site": ITEM_SITES, **{each: each for each in FAMILIES}})
+_GENERATED: Final = MappingProxyType(
+    {"site": ITEM_SITES, **{family: family for family in FAMILIES}}
+)
 """The family of generated sites by the first part of their names; the seed follows."""
 
 MOST_PLACES: Final = 1000
@@ -105,8 +107,8 @@ class Definition:
             "name": self.name,
             "scenario": self.scenario.content_hash,
             "budgets": BUDGETS,
-            "judged": [_charge(each) for each in self.case.threats],
-            "search_set": [_charge(each) for each in search_set.threats],
+            "judged": [_charge(threat) for threat in self.case.threats],
+            "search_set": [_charge(threat) for threat in search_set.threats],
         }
         return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -124,7 +126,7 @@ class Definition:
 
     def _hidden(self) -> LoadCaseSet:
         scenario = self.scenario
-        few = all(isinstance(each, PointSource) for each in scenario.charge) or bool(
+        few = all(isinstance(source, PointSource) for source in scenario.charge) or bool(
             scenario.vehicles
         )
         own = _JUDGED_UNSEEN if self.family == "unseen" else _JUDGED_CHARGES
@@ -154,7 +156,7 @@ _PROBLEMS: Final = (
 )
 
 DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
-    {each.name: each for each in _PROBLEMS}
+    {problem.name: problem for problem in _PROBLEMS}
 )
 """The problems by name. In each the best known layout takes off at least 5 points more of the load
 than the best rule, by the judge's cells."""

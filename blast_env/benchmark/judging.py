@@ -112,7 +112,7 @@ class JudgedSubmission:
     @property
     def submission(self) -> Submission:
         """The submission without its shares, for another judgement."""
-        runs = (Run(*each.key, each.blasts, each.layout, curve=each.curve) for each in self.runs)
+        runs = (Run(*run.key, run.blasts, run.layout, curve=run.curve) for run in self.runs)
         return Submission(self.method, tuple(runs), self.note)
 
     @property
@@ -127,7 +127,7 @@ class JudgedSubmission:
         the seeds of the runs.
         """
         scores = self._by_problem(budget, lambda run: run.score, 0.0)
-        return stratified_estimate([(1.0 / len(scores), each) for each in scores])
+        return stratified_estimate([(1.0 / len(scores), score) for score in scores])
 
     def reduction(self, budget: int) -> Estimate:
         """Return the mean share of the load taken off, with its interval over the problems.
@@ -152,7 +152,7 @@ class JudgedSubmission:
         for run in self.runs:
             if run.budget == budget:
                 found[run.problem].append(value(run))
-        return [each or [missing] for each in found.values()]
+        return [item or [missing] for item in found.values()]
 
     def _mean(self, budget: int, value: Callable[[JudgedRun], float], missing: float) -> Estimate:
         return mean_estimate(self._means(budget, value, missing))
@@ -227,15 +227,15 @@ def _judged(
 ) -> Iterator[JudgedRun]:
     cell = "" if cell_m is None else cell_key(cell_m)
     stored = {
-        each.layout: each.shares[cell]
-        for each in (reference.rule, reference.best)
-        if cell in each.shares and engine_key(evaluator.engine) == reference.engine
+        run.layout: run.shares[cell]
+        for run in (reference.rule, reference.best)
+        if cell in run.shares and engine_key(evaluator.engine) == reference.engine
     }
     wanted = (reference.rule.layout, reference.best.layout, *(run.layout for run in runs))
-    layouts = [each for each in dict.fromkeys(wanted) if each not in stored]
+    layouts = [layout for layout in dict.fromkeys(wanted) if layout not in stored]
     found = shares_of(definition.case, layouts, evaluator, processes)
     shares = dict(zip(layouts, found, strict=True)) | stored
-    rule, best = (shares[each.layout] for each in (reference.rule, reference.best))
+    rule, best = (shares[run.layout] for run in (reference.rule, reference.best))
     for run in runs:
         yield JudgedRun(**vars(run), share=shares[run.layout], rule=rule, best=best)
 
@@ -261,8 +261,8 @@ def shipped_standings() -> tuple[JudgedSubmission, ...]:
     folder = files("blast_env.benchmark").joinpath("data/standings")
     if not folder.is_dir():
         return ()
-    found = (each for each in folder.iterdir() if each.name.endswith(".json"))
+    found = (path for path in folder.iterdir() if path.name.endswith(".json"))
     return tuple(
-        checked_as(JudgedSubmission, parse_json(each.read_text("utf-8")))
-        for each in sorted(found, key=lambda each: each.name)
+        checked_as(JudgedSubmission, parse_json(path.read_text("utf-8")))
+        for path in sorted(found, key=lambda path: path.name)
     )

@@ -39,8 +39,8 @@ def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layou
     result = proposer.propose(problem, problem.most_blasts, seed)
     if result.interrupted:
         raise KeyboardInterrupt
-    for each in result.history:
-        problem.enter(each)
+    for step in result.history:
+        problem.enter(step)
     return result.layout
 
 
@@ -110,7 +110,7 @@ def budgets_of(name: str, asked: Sequence[int]) -> tuple[int, ...]:
     if ":" in name and asked:
         return tuple(asked)
     known = tuple(asked or BUDGETS[:2])
-    return known if kind is ProposerKind.LEARNT else tuple(each for each in known if each)
+    return known if kind is ProposerKind.LEARNT else tuple(number for number in known if number)
 
 
 def entries(
@@ -128,11 +128,11 @@ def entries(
         BlastEnvError: If a method needs blasts, and the budget is 0.
     """
     for name in names:
-        for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
-            budgets = budgets_of(each, asked)
+        for proposer in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
+            budgets = budgets_of(proposer, asked)
             if not budgets:
-                raise BlastEnvError(f"--budget is 0: {each} needs blasts")
-            yield each, find_method(each), budgets
+                raise BlastEnvError(f"--budget is 0: {proposer} needs blasts")
+            yield proposer, find_method(proposer), budgets
 
 
 def references_of(
@@ -154,9 +154,9 @@ def references_of(
     found, engine = {}, find_engine(JUDGE, cell_m)
     for name, definition in definitions.items():
         more = {
-            f"{each.method}, {run.budget} blasts, seed {run.seed}": run.layout
-            for each in played
-            for run in each.runs
+            f"{submission.method}, {run.budget} blasts, seed {run.seed}": run.layout
+            for submission in played
+            for run in submission.runs
             if run.problem == name
         }
         if guided is not None:
@@ -190,5 +190,5 @@ def reference_of(
         definition.digest,
         engine_key(evaluator.engine),
         {name: shares[name] for name in rules},
-        *(KnownLayout(each, known[each], {cell: shares[each]}) for each in (rule, best)),
+        *(KnownLayout(layout, known[layout], {cell: shares[layout]}) for layout in (rule, best)),
     )

@@ -106,18 +106,18 @@ class BenchmarkProblem(DesignProblem):
     @property
     def best(self) -> EvaluatedLayout | None:
         """The best of the layouts evaluated with most threats; `None` before the first."""
-        return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
+        return min(self.history, key=lambda step: (-step.threats, step.share), default=None)
 
     @property
     def curve(self) -> tuple[tuple[int, float], ...]:
         """Blasts spent and share of the best layout so far, each time it changed."""
         found: list[tuple[int, float]] = []
         best = (0, 0.0)
-        for each in self.history:
-            rank = (-each.threats, each.share)
+        for step in self.history:
+            rank = (-step.threats, step.share)
             if rank < best:
                 best = rank
-                found.append((each.blasts, round(each.share, 5)))
+                found.append((step.blasts, round(step.share, 5)))
         return tuple(found)
 
     def enter(self, found: Candidate) -> None:
@@ -209,7 +209,7 @@ def shares_of(
     """
     pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
     loads = [
-        each.load(case.scenario.objective) for each in evaluator.loads_of_many(pairs, processes)
+        load.load(case.scenario.objective) for load in evaluator.loads_of_many(pairs, processes)
     ]
     of_layout = [
         case.objective_value(own, layout)

@@ -45,7 +45,7 @@ class LayoutSpace:
     def options(self) -> tuple[tuple[Element, ...], ...]:
         """The elements that may stand on each place, row by row; then each measure."""
         catalogue = self._empty.catalogue
-        is_measure = np.array([each.is_measure for each in catalogue.variants])
+        is_measure = np.array([variant.is_measure for variant in catalogue.variants])
         pieces = self._empty.legal & ~is_measure[:, None, None]
         found = [
             tuple(
@@ -55,7 +55,7 @@ class LayoutSpace:
             for row, column in zip(*pieces.any(axis=0).nonzero(), strict=True)
         ]
         measures = self._empty.legal[:, :1, :1].any(axis=(1, 2)) & is_measure
-        found += [(catalogue.element_at(int(each), 0, 0),) for each in measures.nonzero()[0]]
+        found += [(catalogue.element_at(int(index), 0, 0),) for index in measures.nonzero()[0]]
         return tuple(found)
 
     @cached_property

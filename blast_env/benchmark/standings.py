@@ -28,8 +28,10 @@ _NAMED = 3
 def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[Table]:
     """Yield a table for each set of problems and size of the judge's cells."""
     groups: dict[tuple[tuple[str, ...], float], list[JudgedSubmission]] = {}
-    for each in judged:
-        groups.setdefault((tuple(sorted(each.problems)), each.cell_m), []).append(each)
+    for judged_submission in judged:
+        groups.setdefault(
+            (tuple(sorted(judged_submission.problems)), judged_submission.cell_m), []
+        ).append(judged_submission)
     for (problems, cell_m), own in groups.items():
         yield _table(own, problems, cell_m)
 
@@ -42,8 +44,8 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
         title = markup_text(table.title)
         parts += [f"## {title}\n", markdown_table(table.headers, rows) + "\n"]
     methods: dict[str, list[str]] = {}
-    for each in judged:
-        methods.setdefault(each.note, []).append(each.method)
+    for judged_submission in judged:
+        methods.setdefault(judged_submission.note, []).append(judged_submission.method)
     notes = [
         (markup_text(", ".join(names)), markup_text(note))
         for note, names in methods.items()
@@ -98,5 +100,5 @@ def _table(judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: 
 
 def _ends(found: Estimate, form: str) -> str:
     """Return the interval of an estimate as text, if it has one."""
-    low, high = (form.format(each) for each in found[1:])
+    low, high = (form.format(item) for item in found[1:])
     return "" if isnan(found.low) else f"({low} to {high})"

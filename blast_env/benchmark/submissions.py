@@ -178,7 +178,7 @@ def _runs_in(path: Path, kinds: tuple[Any, ...]) -> Any:
         if isinstance(runs, list) and len(runs) > MOST_RUNS:
             raise BlastEnvError(f"has {len(runs):,} runs, must have at most {MOST_RUNS:,}")
         asked: Any = given.get("format")
-        kind = next((each for each in kinds if each.format == asked), kinds[0])
+        kind = next((kind for kind in kinds if kind.format == asked), kinds[0])
         return checked_as(kind, content)
     except BlastEnvError as error:
         raise BlastEnvError(f"{path}: {error}") from error

@@ -59,7 +59,7 @@ def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
         same = known.setdefault(path.resolve(), option)
         if same != option:
             raise BlastEnvError(f"{same} and {option} are the same file, {path}")
-    folders = [each.path for each in targets if not each.suffixes]
+    folders = [target.path for target in targets if not target.suffixes]
     before = {folder: _missing_above(folder) for folder in folders}
     present = {path for folder in before for path in _folders_in(folder)}
     try:
@@ -168,13 +168,13 @@ def _texts(given: Any) -> Iterator[str]:
     if isinstance(given, str):
         yield given
     elif isinstance(given, list | tuple):
-        for each in given:
-            yield from _texts(each)
+        for text in given:
+            yield from _texts(text)
 
 
 def _leaves(kinds: Iterable[Any]) -> Iterator[Any]:
-    for each in kinds:
-        yield from _leaves(inner) if (inner := get_args(each)) else (each,)
+    for kind in kinds:
+        yield from _leaves(inner) if (inner := get_args(kind)) else (kind,)
 
 
 class LazyCommand(TyperCommand):

@@ -154,15 +154,15 @@ def import_map(
 def _options(context: typer.Context) -> ImportOptions:
     """Return the options of the command line, with the numbers of those that have commas."""
     values = dict(context.params)
-    for each in context.command.params:
-        name, form = each.name or "", getattr(each, "metavar", None) or ""
+    for parameter in context.command.params:
+        name, form = parameter.name or "", getattr(parameter, "metavar", None) or ""
         given = values.get(name)
         if isinstance(given, str) and "," in form:
-            values[name] = numbers(each.opts[0], given, form)
+            values[name] = numbers(parameter.opts[0], given, form)
         elif isinstance(given, list | tuple):
             texts = [str(text) for text in given]
-            values[name] = tuple(numbers(each.opts[0], x, form) if form else x for x in texts)
-    known = {each.name for each in fields(ImportOptions)}
+            values[name] = tuple(numbers(parameter.opts[0], x, form) if form else x for x in texts)
+    known = {field.name for field in fields(ImportOptions)}
     return ImportOptions(**{name: value for name, value in values.items() if name in known})
 
 
@@ -176,16 +176,16 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     width_m, height_m = imported.site.size_m
     rows = [
         (
-            titled(each.name, each.title) + (" (cut)" if each.is_cut else ""),
-            "yes" if each.protected else "no",
-            f"{len(each.polygons)}",
-            "air" if each.height_m is None else f"{each.height_m:g}",
-            f"{each.outline.area:,.1f}",
-            f"{each.area_m2:,.1f}",
-            f"{100.0 * each.deviation.area_share:.1f}",
-            f"{each.deviation.outline_m:.2f}",
+            titled(building.name, building.title) + (" (cut)" if building.is_cut else ""),
+            "yes" if building.protected else "no",
+            f"{len(building.polygons)}",
+            "air" if building.height_m is None else f"{building.height_m:g}",
+            f"{building.outline.area:,.1f}",
+            f"{building.area_m2:,.1f}",
+            f"{100.0 * building.deviation.area_share:.1f}",
+            f"{building.deviation.outline_m:.2f}",
         )
-        for each in imported.buildings
+        for building in imported.buildings
     ]
     size, turned = f"{width_m:g} x {height_m:g} m", imported.site.rotation_deg
     title = f"{imported.scenario.name}: {size}, turned by {turned:.2f} degrees"
@@ -194,7 +194,7 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
         f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
         f"{imported.scenario.simulation.preset}"
     )
-    sums = Counter(each.fate for each in imported.ledger.entries)
+    sums = Counter(entry.fate for entry in imported.ledger.entries)
     words = ", ".join(f"{fate} {count}" for fate, count in sums.items())
     print_line(f"ledger of {imported.ledger.objects} objects: {words}")
     for note in imported.notes:

@@ -109,12 +109,14 @@ def judge(
         if out is not None:
             make_folder(out)
         submitted = [read_submission(path) for path in submissions]
-        judged = [judging.judged(each, DEFINITIONS, stored_references()) for each in submitted]
+        judged = [
+            judging.judged(submission, DEFINITIONS, stored_references()) for submission in submitted
+        ]
         if plays:
             definitions = _definitions(problem, secret, sites, scenario, threat, cases)
             played = [
-                judging.played(*each, definitions)
-                for each in _methods(method, run, budget, definitions)
+                judging.played(*item, definitions)
+                for item in _methods(method, run, budget, definitions)
             ]
             references = stored_references()
             if secret is not None or scenario:
@@ -122,7 +124,7 @@ def judge(
 
                 guided = judging.made if secret is not None else None
                 references = references_of(definitions, played, cell_m, judging.shared, guided)
-            judged += [judging.judged(each, definitions, references) for each in played]
+            judged += [judging.judged(item, definitions, references) for item in played]
     together = (*shipped_standings(), *judged)
     print_parts(standings_tables(together))
     if not together:
@@ -141,15 +143,17 @@ def _definitions(
 ) -> Mapping[str, Definition]:
     """Return the problems of the methods by name: those named, secret, or of your own sites."""
     asked = {"--problem": problems, "--secret": secret, "--scenario": scenarios}
-    given = [name for name, each in asked.items() if each]
+    given = [name for name, item in asked.items() if item]
     if len(given) > 1:
         raise BlastEnvError(f"{' and '.join(given)} exclude each other")
     if secret is not None:
-        return {each.name: each for each in secret_sites(secret, count)}
+        return {secret_site.name: secret_site for secret_site in secret_sites(secret, count)}
     if scenarios:
         check_names("threat", [threat], ["visible", "hidden"])
-        own = [site_problems(each, cases, is_hidden=threat == "hidden") for each in scenarios]
-        return {each.name: each for of_site in own for each in of_site}
+        own = [
+            site_problems(scenario, cases, is_hidden=threat == "hidden") for scenario in scenarios
+        ]
+        return {problem.name: problem for of_site in own for problem in of_site}
     return {name: make(name).definition for name in problems or DEFINITIONS}
 
 
@@ -165,7 +169,7 @@ def _methods(
     here = str(Path.cwd())
     if names and here not in sys.path:
         sys.path.insert(0, here)  # for module:object
-    yield from entries(names, asked, [each.scenario for each in definitions.values()])
+    yield from entries(names, asked, [definition.scenario for definition in definitions.values()])
     if runs:
         with import_extra("agents", "trained agents"):
             from blast_agents.training import load_agent
@@ -195,7 +199,7 @@ class _Judging:
         definitions: Mapping[str, Definition],
     ) -> Submission:
         """Run a method; its submission is written before it is judged."""
-        made = [partial(self.made, each) for each in definitions.values()]
+        made = [partial(self.made, definition) for definition in definitions.values()]
         asked = tuple(RunGrid(made, budgets, self.seeds))
         store = None
         if self.out is not None:  # the runs that a call may resume: same method, same cells

@@ -194,8 +194,8 @@ def search(
         print_search(run, checked)
         if out is not None:
             options = {
-                name: [*map(str, each)] if name == "start_from" else each
-                for name, each in context.params.items()
+                name: [*map(str, parameter)] if name == "start_from" else parameter
+                for name, parameter in context.params.items()
                 if name not in _NOT_OF_THE_SEARCH
             }
             options |= {"budget": run.result.budget, "surrogate": digest}
@@ -248,8 +248,8 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
     scenario, evaluator = problem.scenario, problem.evaluator
     print_line(evaluator.engine.describe([scenario]))
     turns = islice(cycle(problem.threats), budget)
-    costs = (evaluator.engine.cost(scenario, each.charge) for each in turns)
-    print_cost(each for each in costs if each is not None)
+    costs = (evaluator.engine.cost(scenario, turn.charge) for turn in turns)
+    print_cost(cost for cost in costs if cost is not None)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.counts.cache_hits, perf_counter()
     with progress_bar(f"{method.name} search in {scenario.name}") as progress:
@@ -273,8 +273,10 @@ def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | No
     else:
         threats = tuple(LoadCase(problem.threats[0].charge, seed) for seed in seeds)
     if not problem.evaluator.engine.has_noise:  # each charge is one blast
-        used = {each.charge for each in problem.threats}
-        threats = tuple(each for each in one_of_each_charge(threats) if each.charge not in used)
+        used = {threat.charge for threat in problem.threats}
+        threats = tuple(
+            load_case for load_case in one_of_each_charge(threats) if load_case.charge not in used
+        )
     if not threats:
         return None
     with progress_bar(f"check on {len(threats)} other threats") as progress:
@@ -439,7 +441,7 @@ def _given_charge(scenario: Scenario, given: GivenCharge) -> AnyCharge | None:
     bounds = [source_bounds_m(source) for source in scenario.charge]
     x_m, y_m = given.place_m
     if not any(
-        each.left <= x_m <= each.right and each.bottom <= y_m <= each.top for each in bounds
+        bound.left <= x_m <= bound.right and bound.bottom <= y_m <= bound.top for bound in bounds
     ):
         print_line(
             f"note: {scenario.name} never has a charge at ({x_m:g}, {y_m:g}) m: --verify the "
@@ -466,16 +468,16 @@ def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
     layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
     distinct = list(dict.fromkeys(layouts.values()))
     print_line(engine.describe())
-    named = {str(number): each for number, each in enumerate(distinct)}
+    named = {str(number): layout for number, layout in enumerate(distinct)}
     print_cost(Campaign.on(scenario, named, case.threats, engine, engine.coarser).cost())
     evaluators, found = Evaluators(engine), dict[Layout, Evaluation]()
     with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
-        for number, each in enumerate(distinct):
+        for number, item in enumerate(distinct):
             share = share_of(progress, number, len(distinct))
-            found[each] = compare(
-                evaluators, [case], [each], problem.processes, with_error=True, progress=share
+            found[item] = compare(
+                evaluators, [case], [item], problem.processes, with_error=True, progress=share
             )
-    loads = {name: found[each].load for name, each in layouts.items()}
+    loads = {name: found[layout].load for name, layout in layouts.items()}
     best_last = sorted(rules, key=lambda name: -loads[name])
     rows: list[tuple[AnyCell, ...]] = []
     for name in (_NOTHING, *best_last, _PROPOSAL):

@@ -125,7 +125,7 @@ def simulate(
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
-    files = BlastFiles(**{each.name: context.params[each.name] for each in fields(BlastFiles)})
+    files = BlastFiles(**{field.name: context.params[field.name] for field in fields(BlastFiles)})
     fixed = given.fixed(site, draw_threat(site, seed))
     blast: Any = used.blast(site, elements, seed, fixed)
     files.check(blast)
@@ -176,7 +176,7 @@ def _print_particles(result: BlastResult) -> None:
     ]
     _print_loads(result, scene.charge, f"seed {blast.seed}", _PARTICLE_HEADERS, rows)
     outside = "outside the range of the calibration (marked ~)"
-    notes = {f"{outside}: {each.name}, {note}" for each in loads for note in each.notes}
+    notes = {f"{outside}: {load.name}, {note}" for load in loads for note in load.notes}
     notes |= {error} if error else set()
     texts = [*(f"impulse (Pa s): {note}" for note in sorted(notes)), *blast.scenario.height_notes]
     _print_end(result, f"{len(scene.balls):,} balls", result.step_name, texts)
@@ -193,8 +193,8 @@ def _loads(result: "BlastResult | GasResult") -> tuple[tuple[StructureLoad, ...]
 def _impulse_texts(loads: Sequence[StructureLoad]) -> dict[str, str]:
     """Return the impulse on each building, marked if it is outside the range."""
     return {
-        each.name: f"{'' if each.in_range else '~'}{each.impulse_pa_s:,.0f}"
-        for each in on_buildings(loads)
+        on_building.name: f"{'' if on_building.in_range else '~'}{on_building.impulse_pa_s:,.0f}"
+        for on_building in on_buildings(loads)
     }
 
 
@@ -205,27 +205,27 @@ def _print_gas(result: "GasResult") -> None:
     impulses = _impulse_texts(loads)
     rows = [
         (
-            building_words(scenario, each["building"]),
-            "yes" if each["protected"] else "no",
-            impulses[each["building"]],
-            _captured(each),
-            f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
-            _number(MS_PER_S * each["arrival_s"], ".1f"),
-            f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
-            _number(each["roof_impulse_pa_s"], ",.0f"),
-            each["validation"],
+            building_words(scenario, row["building"]),
+            "yes" if row["protected"] else "no",
+            impulses[row["building"]],
+            _captured(row),
+            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
+            _number(MS_PER_S * row["arrival_s"], ".1f"),
+            f"{row['most_loaded_face']} {row['most_loaded_pa_s']:,.0f}",
+            _number(row["roof_impulse_pa_s"], ",.0f"),
+            row["validation"],
         )
-        for each in result.buildings.to_dict("records")
+        for row in result.buildings.to_dict("records")
     ]
     _print_loads(result, charge, f"{charge.height_m:g} m high", _GAS_HEADERS, rows)
     gauges = [
         (
-            *(each["name"], f"{each['x_m']:.2f}", f"{each['y_m']:.2f}", f"{each['z_m']:.2f}"),
-            f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
-            f"{each['impulse_pa_s']:,.0f}",
-            _captured(each),
+            *(row["name"], f"{row['x_m']:.2f}", f"{row['y_m']:.2f}", f"{row['z_m']:.2f}"),
+            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
+            f"{row['impulse_pa_s']:,.0f}",
+            _captured(row),
         )
-        for each in result.gauges.to_dict("records")
+        for row in result.gauges.to_dict("records")
     ]
     if gauges:
         print_table("gauges", _GAUGES, gauges)
@@ -233,7 +233,7 @@ def _print_gas(result: "GasResult") -> None:
     texts = [*validation_lines(scenario, result.buildings, "building")]
     # One line a cause: a validation status has named its own.
     said = tuple(result.buildings["reason"])
-    notes = dict.fromkeys(note for each in loads for note in each.notes)
+    notes = dict.fromkeys(note for load in loads for note in load.notes)
     texts += [
         f"outside the validated range (marked ~): {note}"
         for note in notes
@@ -241,7 +241,7 @@ def _print_gas(result: "GasResult") -> None:
     ]
     texts += [note for note in result.stepped_notes if not note.endswith(said)]
     texts += result.moved_gauges
-    texts += (f"{each.building}: {each.words}" for each in result.unjudged)
+    texts += (f"{wall.building}: {wall.words}" for wall in result.unjudged)
     cells = " x ".join(str(count) for count in result.run.grid.shape)
     _print_end(result, f"{cells} cells", "steps", texts)
 
@@ -290,8 +290,8 @@ def _record(result: "BlastResult | GasResult", written: Sequence[Path]) -> dict[
     """
     loads, error = _loads(result)
     impulse = {
-        each.name: {"pa_s": each.impulse_pa_s, "in_range": each.in_range, "notes": each.notes}
-        for each in loads
+        load.name: {"pa_s": load.impulse_pa_s, "in_range": load.in_range, "notes": load.notes}
+        for load in loads
     }
     content: dict[str, object] = {
         "run": {

@@ -59,7 +59,9 @@ def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[s
         )
     else:
         for reason in dict.fromkeys(refusals.values()):
-            engines = [engine for engine, each in refusals.items() if each == reason and each]
+            engines = [
+                engine for engine, refusal in refusals.items() if refusal == reason and refusal
+            ]
             if engines:
                 yield f"no loads in Pa s with {' and '.join(engines)}: {reason}"
     name = scenario.simulation.preset
@@ -72,7 +74,7 @@ def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[s
 
 def _height_limits(scenario: Scenario) -> Iterator[str]:
     zone = scenario.build_zone
-    endless = [each.name for each in scenario.structures if each.height_m is None]
+    endless = [structure.name for structure in scenario.structures if structure.height_m is None]
     if zone is not None and not zone.items and zone.height_m is None:
         endless.append("the modules of the build zone")
     if endless:
@@ -108,7 +110,7 @@ def _speed_limits(scenario: Scenario) -> Iterator[str]:
     zone = scenario.build_zone
     if zone is None or all(source.motion is None for source in scenario.vehicles):
         return
-    unrated = [each.name for each in zone.items if each.stops_vehicles and not each.crash_rating]
+    unrated = [item.name for item in zone.items if item.stops_vehicles and not item.crash_rating]
     if not zone.items:
         unrated.append("the modules")
     if zone.access_way and zone.access_way.gate and not zone.access_way.gate.crash_rating:

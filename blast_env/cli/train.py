@@ -101,7 +101,7 @@ def train(
     if folder is None:
         raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
     if resume is not None:
-        fixed = {each.name or "" for each in context.command.params} - {*_WITH_RESUME}
+        fixed = {parameter.name or "" for parameter in context.command.params} - {*_WITH_RESUME}
         refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
     # Here, because torch takes seconds to start, and is an extra; not below, because before it
     # there is nothing to resume.

@@ -146,10 +146,10 @@ def _in_the_air(load: Load, ways: Ways, charge_kg: float) -> FloatArray:
     burst: Burst = "spherical"
     both_m = ways.away_m, ways.mirrored_m
     cosines = ways.cosine, ways.mirrored_cosine
-    incident = [within_curves(_NAMES[load][1], each, charge_kg, burst) for each in both_m]
+    incident = [within_curves(_NAMES[load][1], item, charge_kg, burst) for item in both_m]
     side_on = incident[0] + incident[1]
     if load == "impulse":
-        reflected = [within_curves(_NAMES[load][0], each, charge_kg, burst) for each in both_m]
+        reflected = [within_curves(_NAMES[load][0], item, charge_kg, burst) for item in both_m]
         own, mirrored = (oblique(*wave) for wave in zip(reflected, incident, cosines, strict=True))
         return np.where(ways.seen, own + mirrored, side_on)
     on_ground = reflected_pa(incident[0], ways.ground_cosine) / incident[0]

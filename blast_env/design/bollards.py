@@ -68,7 +68,9 @@ def posts_and_wall(
     """
     found = find_scenario(scenario)
     posts = _line_on(_ById(found))
-    source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
+    source = min(
+        found.vehicles, key=lambda vehicle: _Vehicles.scaled_m(found, vehicle, posts.layout)
+    )
     place_m = worst_places(found, source, posts.layout).place_m(0)
     return wall_added_to(posts, place_m, NEAR_CHARGE).layout
 
@@ -189,7 +191,9 @@ class _Vehicles:
             yield (tuple((row, column) for column in columns),)
         for column in range(zone.columns):
             yield (tuple((row, column) for row in rows),)
-        protected = [each.rectangle_m for each in self.scenario.structures if each.protected]
+        protected = [
+            structure.rectangle_m for structure in self.scenario.structures if structure.protected
+        ]
         around = Rectangle.around(protected)
         for steps in range(max(len(rows), len(columns))):
             yield self._ring(around.grown(steps * MODULE_SIDE_M))
@@ -197,7 +201,7 @@ class _Vehicles:
     def items(self) -> list[int]:
         """Return the indices of the items that stop vehicles, or that of the single module."""
         variants = self._empty.catalogue.variants
-        return sorted({each.item for each in variants if each.stops_vehicles})
+        return sorted({variant.item for variant in variants if variant.stops_vehicles})
 
     def with_posts(self, line: Line, item: int) -> LayoutState | None:
         """Return the placement of the fewest posts that close a line, or `None` if none do."""
@@ -223,7 +227,7 @@ class _Vehicles:
         """Return the placement without posts that do not increase the least scaled distance."""
         farthest = self.farthest(placement)
         for post in placement.layout:
-            fewer = tuple(each for each in placement.layout if each != post)
+            fewer = tuple(element for element in placement.layout if element != post)
             without = LayoutState.of(self.scenario, fewer)
             if self.farthest(without) > farthest - _TOLERANCE:
                 placement = without
@@ -232,16 +236,16 @@ class _Vehicles:
     @cached_property
     def width(self) -> float:
         """Width of the narrowest vehicle in modules."""
-        return min(each.width_m for each in self.scenario.vehicles) / MODULE_SIDE_M
+        return min(vehicle.width_m for vehicle in self.scenario.vehicles) / MODULE_SIDE_M
 
     def _along(self, item: int, run: tuple[Cell, ...]) -> "_Post":
         """Return the variant of an item with the largest length along a run."""
         is_row = run[0][0] == run[-1][0]
         variants = self._empty.catalogue.variants
         posts = [
-            _Post(number, each.columns if is_row else each.rows)
-            for number, each in enumerate(variants)
-            if each.item == item
+            _Post(number, variant.columns if is_row else variant.rows)
+            for number, variant in enumerate(variants)
+            if variant.item == item
         ]
         return max(posts, key=lambda post: post.length)
 

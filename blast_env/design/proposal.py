@@ -91,7 +91,7 @@ def search(
     problem = search_problem(
         scenario, charge, engine, cache, threats=threats, seed=seed, processes=processes
     )
-    proposer = find_proposer(method, tuple(tuple(each) for each in initial))
+    proposer = find_proposer(method, tuple(tuple(layout) for layout in initial))
     blasts = proposer_row(method).budget if budget is None else budget
     return proposer.propose(problem, blasts, seed, report)
 

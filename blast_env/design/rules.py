@@ -100,9 +100,9 @@ def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
     cells = _between(placement.scenario, place_m)
     if not cells.any():
         around = (
-            f"; that place lies within the bounds of {each.name}"
-            for each in placement.scenario.structures
-            if each.protected and each.rectangle_m.distance_to(place_m) <= 0.0
+            f"; that place lies within the bounds of {structure.name}"
+            for structure in placement.scenario.structures
+            if structure.protected and structure.rectangle_m.distance_to(place_m) <= 0.0
         )
         why = next(around, "")
         return f"the build zone has no cell {way}{why}{': choose one charge' if several else ''}"
@@ -158,7 +158,7 @@ def wall_added_to(
                 growing.remove(end.side)
                 continue
             placement = placement.place(placement.catalogue.element_at(*place))
-            ends = {each.side: view.end_with(place, wall_m, each) for each in ends.values()}
+            ends = {end.side: view.end_with(place, wall_m, end) for end in ends.values()}
     return placement
 
 
@@ -171,8 +171,10 @@ def _preferred(placement: LayoutState, lies_along: BoolArray, kind: WallKind) ->
         kind: Preferred items.
     """
     variants = placement.catalogue.variants
-    of_item = Counter(each.item for each in variants)
-    numbers = [i for i, each in enumerate(variants) if lies_along[i] or of_item[each.item] == 1]
+    of_item = Counter(variant.item for variant in variants)
+    numbers = [
+        i for i, variant in enumerate(variants) if lies_along[i] or of_item[variant.item] == 1
+    ]
     longer = [i for i in numbers if max(variants[i].rows, variants[i].columns) > 1]
     has_budget = placement.scenario.zone.budget is not None
 
@@ -238,7 +240,9 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
         BlastEnvError: As for `line_of_sight_wall`.
     """
     placement = LayoutState.empty(scenario)
-    protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]
+    protected = [
+        structure.rectangle_m for structure in placement.scenario.structures if structure.protected
+    ]
     place_m = _place_m(placement, charge)
     nearest = min(protected, key=lambda rectangle: rectangle.distance_to(place_m))
     return _ring(placement, nearest, place_m)
@@ -274,11 +278,11 @@ def hardening_alone(scenario: AnyScenario, charge: AnyCharge | None = None) -> L
     """
     found = find_scenario(scenario)
     placement, hardened = LayoutState.empty(found), set[tuple[str, str]]()
-    for each in sorted(found.zone.hardening, key=lambda it: -it.cost):
-        kinds = [kind for kind in ("glazing", "wall") if getattr(each, kind) is not None]
-        bays = [bay.bay.name for bay in found.named_bays() if each.covers(bay.bay)]
+    for item in sorted(found.zone.hardening, key=lambda it: -it.cost):
+        kinds = [kind for kind in ("glazing", "wall") if getattr(item, kind) is not None]
+        bays = [bay.bay.name for bay in found.named_bays() if item.covers(bay.bay)]
         changed = {(name, kind) for name in bays for kind in kinds}
-        measure = Measure.named(each.name)
+        measure = Measure.named(item.name)
         if changed - hardened and placement.explain(measure) is None:
             placement, hardened = placement.place(measure), hardened | changed
     return placement.layout
@@ -370,8 +374,8 @@ class _View:
         variants = placement.catalogue.variants
         up_m, right_m = _centres_off_m(variants)
         across_x, across_y = abs(along_y), abs(along_x)
-        columns_m = MODULE_SIDE_M / 2.0 * np.array([each.columns for each in variants])
-        rows_m = MODULE_SIDE_M / 2.0 * np.array([each.rows for each in variants])
+        columns_m = MODULE_SIDE_M / 2.0 * np.array([variant.columns for variant in variants])
+        rows_m = MODULE_SIDE_M / 2.0 * np.array([variant.rows for variant in variants])
         half_width_m = columns_m * across_x + rows_m * across_y
         return cls(
             depth_m=depth_m + (right_m * along_x + up_m * along_y),
@@ -448,9 +452,9 @@ def _between(scenario: Scenario, charge_m: PointM) -> BoolArray:
     along_x, along_y, distance_m = _line_of_sight(scenario, charge_m)
     depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
     between: BoolArray = (depth_m > 0.0) & (depth_m < distance_m)
-    for each in scenario.structures:
-        if each.protected:
-            between &= ~each.rectangle_m.intersects_segments(charge_m, x_m, y_m)
+    for structure in scenario.structures:
+        if structure.protected:
+            between &= ~structure.rectangle_m.intersects_segments(charge_m, x_m, y_m)
     return between
 
 
@@ -459,8 +463,8 @@ def _centres_off_m(variants: Sequence[Variant]) -> tuple[FloatArray, FloatArray]
 
     Both have the shape (variants, 1, 1).
     """
-    up = np.array([each.rows - 1 for each in variants])[:, np.newaxis, np.newaxis]
-    right = np.array([each.columns - 1 for each in variants])[:, np.newaxis, np.newaxis]
+    up = np.array([variant.rows - 1 for variant in variants])[:, np.newaxis, np.newaxis]
+    right = np.array([variant.columns - 1 for variant in variants])[:, np.newaxis, np.newaxis]
     return MODULE_SIDE_M / 2.0 * up, MODULE_SIDE_M / 2.0 * right
 
 
@@ -488,7 +492,7 @@ def _ring(placement: LayoutState, around: Rectangle, start_m: PointM) -> Layout:
     order = _preferred(placement, np.ones(len(variants), dtype=bool), "high")
     ring_m = None
     for item in dict.fromkeys(variants[number].item for number in order):
-        own = np.array([each.item == item for each in variants])
+        own = np.array([variant.item == item for variant in variants])
         stands = lies_along & own[:, np.newaxis, np.newaxis]
         possible = placement.legal & stands
         if ring_m is None and possible.any():
@@ -528,8 +532,10 @@ def _around(
     gap_x_m = np.abs(from_x_m) - half_right_m - (around.right - around.left) / 2.0
     gap_y_m = np.abs(from_y_m) - half_up_m - (around.top - around.bottom) / 2.0
     upright = gap_x_m >= gap_y_m  # at the west or east side, rather than the south or north one
-    of_item = Counter(each.item for each in variants)
-    fixed = np.array([of_item[each.item] == 1 for each in variants])[:, np.newaxis, np.newaxis]
+    of_item = Counter(variant.item for variant in variants)
+    fixed = np.array([of_item[variant.item] == 1 for variant in variants])[
+        :, np.newaxis, np.newaxis
+    ]
     lies_along = fixed | np.where(upright, up_m > right_m, right_m > up_m)
     return turn_rad, np.maximum(gap_x_m, gap_y_m).round(9), lies_along
 
@@ -543,9 +549,9 @@ def _middle_m(source: AnySource) -> PointM:
 
 def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:
     """Return the mean of the protected structures' centres by weight."""
-    protected = [each for each in scenario.structures if each.protected]
-    weights = np.array([each.weight for each in protected])
-    x_m, y_m = weights @ [each.rectangle_m.centre for each in protected] / weights.sum()
+    protected = [structure for structure in scenario.structures if structure.protected]
+    weights = np.array([structure.weight for structure in protected])
+    x_m, y_m = weights @ [structure.rectangle_m.centre for structure in protected] / weights.sum()
     return float(x_m), float(y_m)
 
 
@@ -579,7 +585,7 @@ def random_element(placement: LayoutState, rng: np.random.Generator) -> Element:
     """
     legal, catalogue = placement.legal, placement.catalogue
     if catalogue.has_items:
-        numbers = np.array([each.item for each in catalogue.variants])
+        numbers = np.array([variant.item for variant in catalogue.variants])
         items = np.unique(numbers[legal.any(axis=(1, 2))])
         chosen = items[rng.integers(len(items))]
         legal = legal & (numbers == chosen)[:, np.newaxis, np.newaxis]

@@ -89,7 +89,7 @@ def build_scene(
         ValueError: If the seed is negative.
     """
     base = build_site(scenario, layout, seed, charge)
-    if any(each.base_m or each.carries for each in scenario.structures):
+    if any(structure.base_m or structure.carries for structure in scenario.structures):
         scenario.check_for_particles()
     _check_not_over_a_roof(scenario, base.charge)
     parameters = _parameters_for(scenario, base.charge)

@@ -317,7 +317,7 @@ class ConcreteSquare(ModularObstacle):
 
 
 _CLASSES: Final = MappingProxyType(
-    {each.__name__: each for each in (ModularObstacle, ConcreteSquare)}
+    {kind.__name__: kind for kind in (ModularObstacle, ConcreteSquare)}
 )
 
 

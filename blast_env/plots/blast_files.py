@@ -52,7 +52,7 @@ class BlastFiles:
             with import_extra("render", "pictures and films"):
                 from blast_env.plots.gas import kind_of
             kind_of(self.quantity or "impulse")
-        names = [each.name for each in blast.site.gauges]
+        names = [gauge.name for gauge in blast.site.gauges]
         if self.history is None:
             if self.gauge is not None:
                 raise BlastEnvError("--gauge is for --history: no history is to be drawn")
@@ -76,8 +76,8 @@ class BlastFiles:
             recorders = () if isinstance(blast, Blast) else (self._recorders(),)
             count = len(blasts)
             return tuple(
-                each.run(share_of(progress, number, count), *recorders)
-                for number, each in enumerate(blasts)
+                blast.run(share_of(progress, number, count), *recorders)
+                for number, blast in enumerate(blasts)
             )
         # Here, because films need the extra `render`.
         from blast_env.plots.film import write_film
@@ -108,12 +108,12 @@ class BlastFiles:
         from blast_env.plots import figures
 
         written = []
-        for number, each in enumerate(reversed(results)):
+        for number, result in enumerate(reversed(results)):
             if self.heat_map is not None:
-                figure = figures.heat_map(each, results)
+                figure = figures.heat_map(result, results)
                 written.append(figures.save_figure(figure, _named(self.heat_map, number)))
             if self.history is not None:
-                figure = figures.impulse_over_time(each)
+                figure = figures.impulse_over_time(result)
                 written.append(figures.save_figure(figure, _named(self.history, number)))
         return written
 
@@ -124,7 +124,7 @@ class BlastFiles:
         from blast_env.plots.ground_map import ground_map, threshold_map
 
         quantity = self.quantity or "impulse"
-        gauge = self.gauge or next((each.name for each in result.run.site.gauges), "")
+        gauge = self.gauge or next((gauge.name for gauge in result.run.site.gauges), "")
         history = partial(gas.gauge_history, result, gauge, free_field=True, beside=unprotected)
         pictures = (
             (self.heat_map, partial(gas.facades, result, quantity=quantity, beside=unprotected)),

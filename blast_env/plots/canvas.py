@@ -77,8 +77,8 @@ class Sheet:
         self._moving: list[Artist] = []
         self._borders: list[Artist] = []
         self._clock: list[Text] = []
-        heights_m = [each.top - each.bottom for each in areas_m]
-        widest_m = max(each.right - each.left for each in areas_m)
+        heights_m = [area_m.top - area_m.bottom for area_m in areas_m]
+        widest_m = max(area_m.right - area_m.left for area_m in areas_m)
         share = min(_MOST_HIGH * columns * widest_m / heights_m[0], 1.0)
         beside = [0.5 * columns * (1.0 / share - 1.0)] if share < 1.0 else []
         widths = [*beside, *[1.0] * columns, *beside]

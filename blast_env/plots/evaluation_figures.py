@@ -50,7 +50,9 @@ _PERCENT = 100.0
 def _shown(scenario: Scenario, layout: Layout) -> list[Feature]:
     """Return the features of the site with a layout, without charges but with vehicle entries."""
     features = (*site_features(scenario, layout), *vehicle_features(scenario, layout))
-    entries = [each for each in features if each.kind is Kinds.CHARGE_PLACE and scenario.vehicles]
+    entries = [
+        feature for feature in features if feature.kind is Kinds.CHARGE_PLACE and scenario.vehicles
+    ]
     return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
 
 
@@ -150,7 +152,7 @@ def evaluation_figure(evaluation: Evaluation, title: str) -> Figure:
     write_legend(figure, [*_charge_legend(evaluation), *legend_of(features)])
     write_heading(figure, title, _subtitle(evaluation))
     trim_height(figure, [plan])
-    charges = [charge_feature(each.charge, "charge") for each in evaluation.outcomes]
+    charges = [charge_feature(outcome.charge, "charge") for outcome in evaluation.outcomes]
     write_names(plan, [*features, *charges])
     return figure
 
@@ -199,9 +201,11 @@ def _draw_threats(axes: Axes, evaluation: Evaluation) -> None:
     axes.legend(loc="upper center", ncols=2, fontsize=8.5, frameon=False)
     axes.grid(axis="y", alpha=0.3)
     if evaluation.engine.has_noise:
-        _name_threats(axes, "seed of the threat", [str(each.threat.seed) for each in outcomes])
+        _name_threats(
+            axes, "seed of the threat", [str(outcome.threat.seed) for outcome in outcomes]
+        )
     else:  # the seed determines only the charge
-        places = (each.charge.position_m for each in outcomes)
+        places = (outcome.charge.position_m for outcome in outcomes)
         names = [f"({x_m:.1f}, {y_m:.1f})" for x_m, y_m in places]
         _name_threats(axes, "charge of the threat (m)", names)
 

@@ -69,13 +69,13 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
 def _draw(plot: Axes, facade: FacadeResponse) -> None:
     """Draw the walls side by side, seen from outside."""
     begin, ticks = 0.0, list[tuple[float, str]]()
-    places = dict.fromkeys(_place_of(each.bay) for each in facade.bays)
-    top_m = max(each.bay.top_m for each in facade.bays)
+    places = dict.fromkeys(_place_of(bay.bay) for bay in facade.bays)
+    top_m = max(bay.bay.top_m for bay in facade.bays)
     for structure, wall, line_number in places:
         own = [
             index
-            for index, each in enumerate(facade.bays)
-            if _place_of(each.bay) == (structure, wall, line_number)
+            for index, bay in enumerate(facade.bays)
+            if _place_of(bay.bay) == (structure, wall, line_number)
         ]
         low = min(facade.bays[index].bay.left_m for index in own)
         high = max(facade.bays[index].bay.right_m for index in own)

@@ -126,7 +126,7 @@ def _particle_footage(
     """
     count = len(blasts)
     results = tuple(
-        each.run(share_of(progress, number, count)) for number, each in enumerate(blasts)
+        blast.run(share_of(progress, number, count)) for number, blast in enumerate(blasts)
     )
     shown = dict.fromkeys(f"{blast.scenario.name}, seed {blast.seed}" for blast in blasts)
     return Footage(

@@ -220,7 +220,7 @@ def _save_gif(frames: Iterable[Frame], path: Path, frames_per_s: float, comment:
     """
     pictures = (Image.fromarray(frame) for frame in frames)
     first = next(pictures).quantize(_GIF_COLOURS, method=Image.Quantize.MAXCOVERAGE)
-    others = [each.quantize(palette=first, dither=Image.Dither.NONE) for each in pictures]
+    others = [picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures]
     try:
         first.save(
             path,

@@ -92,7 +92,7 @@ class FramePainter:
         self.scale = scale
         features = blast_features(blast.scenario, blast.layout, scene.charge)
         on_ground = without(features, Kinds.SITE, *STANDING)
-        destructible = any(each.capacity is not None for each in scene.structures)
+        destructible = any(structure.capacity is not None for structure in scene.structures)
         shown = without(features, Kinds.SITE)
         handles = [*_signs(scene), *legend_of_loads(shown, destructible=destructible)]
         colours = ScalarMappable(scale.norm, load_colours())
@@ -134,15 +134,17 @@ class FramePainter:
             note: A remark under the time, e.g. the real-time factor of a film.
         """
         lines = (f"{time_s * MS_PER_S:.2f} ms", note, self._so_far(obstacles))
-        loads = [artist for each in obstacles for artist in self._loads_on(each)]
+        loads = [artist for obstacle in obstacles for artist in self._loads_on(obstacle)]
         if not self._outlines:
             self._outlines = draw_outlines(self.sheet.axes, obstacles)
         return self.sheet.frame(lines, (*self._flying(balls), *loads, *self._outlines))
 
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
         """Return the present loads on the protected structures, in words."""
-        protected = [each for each in obstacles if each.protected]
-        loads = [f"{each.name} {self.scale.unit.of_structure(each)}" for each in protected]
+        protected = [obstacle for obstacle in obstacles if obstacle.protected]
+        loads = [
+            f"{structure.name} {self.scale.unit.of_structure(structure)}" for structure in protected
+        ]
         return f"so far: {', '.join(loads)}" if loads else ""
 
     def _loads_on(self, obstacle: ModularObstacle) -> tuple[Artist, Artist]:

@@ -130,14 +130,14 @@ def check_comparable(blasts: Sequence[GasBlast]) -> None:
 def both_results(result: GasResult, beside: GasResult | None) -> list[GasResult]:
     """Return one or two results from left to right, checked with `check_comparable`."""
     results = [result] if beside is None else [beside, result]
-    check_comparable([each.blast for each in results])
+    check_comparable([result.blast for result in results])
     return results
 
 
 def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
     """Return the heading of a figure of results, and the line under it."""
     blast = results[-1].blast
-    subtitle = gas_subtitle([each.blast for each in results])
+    subtitle = gas_subtitle([result.blast for result in results])
     if len(results) == 1:
         subtitle += f", {barrier_text(blast.layout)}"
     return f"{blast.scenario.name}: {what}", subtitle
@@ -197,7 +197,7 @@ def facades(
     kind, results = kind_of(quantity), both_results(result, beside)
     outline = _walled(results[0], structure)
     walls = [
-        {wall: _wall(each, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for each in results
+        {wall: _wall(result, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for result in results
     ]
     end = _full(walls) if full is None else full
     scale = Normalize(0.0, end)
@@ -210,12 +210,12 @@ def facades(
     panels = figure.subplots(
         len(results), len(WALLS), squeeze=False, sharey=True, width_ratios=widths.tolist()
     )
-    for row, each in enumerate(results):
+    for row, item in enumerate(results):
         for axes, wall in zip(panels[row], _LEFT_TO_RIGHT, strict=True):
             _draw_wall(axes, outline, wall, walls[row][wall], scale, height_m)
             before = walls[0][wall] if row else None
             axes.set_title(_wall_title(outline, wall, walls[row][wall], before, kind), fontsize=9.5)
-        words = f"{_row_words(each.blast)}\n" if beside is not None else ""
+        words = f"{_row_words(item.blast)}\n" if beside is not None else ""
         panels[row][0].set_ylabel(f"{words}z (m)")
     for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
@@ -247,7 +247,7 @@ def full_load(result: GasResult, structure: str, quantity: str) -> float:
 
 def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
     """Return the load that most of the drawn area does not exceed, rounded up."""
-    loads = np.concatenate([each.ravel() for row in walls for each in row.values()])
+    loads = np.concatenate([array.ravel() for row in walls for array in row.values()])
     loads = loads[np.isfinite(loads)]
     most = float(np.quantile(loads, _SHOWN_SHARE)) if len(loads) else 0.0
     return nice_ceiling(most) if most > 0.0 else 1.0
@@ -280,19 +280,21 @@ class _Walled:
         """Combine structures into one."""
         return cls(
             name,
-            tuple(each.name for each in parts),
-            Rectangle.around([each.rectangle_m for each in parts]),
-            max(each.height_m or air_height_m for each in parts),
-            frozenset(face for each in parts for face in each.faces),
+            tuple(part.name for part in parts),
+            Rectangle.around([part.rectangle_m for part in parts]),
+            max(part.height_m or air_height_m for part in parts),
+            frozenset(face for part in parts for face in part.faces),
         )
 
 
 def _walled(result: GasResult, name: str | None) -> _Walled:
     """Return the structure or building with a name, or by default the worst building."""
     site, scenario = result.run.site, result.blast.scenario
-    known = {each.name: (each,) for each in site.structures if not each.is_barrier}
+    known = {
+        structure.name: (structure,) for structure in site.structures if not structure.is_barrier
+    }
     buildings = {
-        building: tuple(outline for each in parts for outline in known[each.name])
+        building: tuple(outline for part in parts for outline in known[part.name])
         for building, parts in buildings_of(scenario.structures_with(result.blast.layout)).items()
     }
     if name is None:
@@ -406,10 +408,10 @@ def gauge_history(
     results = both_results(result, beside)
     figure = Figure(figsize=(8.6, 6.8), layout="constrained")
     panels = upper, lower = figure.subplots(2, 1, sharex=True)
-    end_s = max(each.time_s for each in results)
-    for each in results:
-        colour, style = (_MAIN, "-") if each is result else (_BESIDE, "--")
-        _draw_history(panels, each, gauge, color=colour, linestyle=style, linewidth=1.8)
+    end_s = max(result.time_s for result in results)
+    for item in results:
+        colour, style = (_MAIN, "-") if item is result else (_BESIDE, "--")
+        _draw_history(panels, item, gauge, color=colour, linestyle=style, linewidth=1.8)
     own = result.gauges.set_index("name").to_dict("index")[gauge]
     place = own["x_m"], own["y_m"], own["z_m"]
     if free_field:

@@ -93,7 +93,7 @@ def ground_values(result: GasResult, quantity: str) -> FloatArray:
         UnknownNameError: If there is no such quantity.
     """
     kind_of(quantity)
-    maps = [each for each in result.run.solver.recorders if isinstance(each, GroundMap)]
+    maps = [recorder for recorder in result.run.solver.recorders if isinstance(recorder, GroundMap)]
     if not maps:
         raise BlastEnvError("the blast has no map: run it with recorders=ground_recorders")
     opening = spherical_stage(result.run.charge, result.run.remap_radius_m)
@@ -144,20 +144,20 @@ def ground_map(
         UnknownNameError: If there is no such quantity.
     """
     kind, results = kind_of(quantity), both_results(result, beside)
-    values = [kind.factor * ground_values(each, quantity) for each in results]
+    values = [kind.factor * ground_values(result, quantity) for result in results]
     if levels is None:
         levels = _contour_levels(
-            [_on_site(each, value)[2] for each, value in zip(results, values, strict=True)]
+            [_on_site(result, value)[2] for result, value in zip(results, values, strict=True)]
         )
     scale = LogNorm(levels[0], levels[-1])
     figure, plans = _plans(results)
-    for axes, each, value in zip(plans, results, values, strict=True):
-        _draw_ground(axes, each, value, levels, scale)
+    for axes, item, value in zip(plans, results, values, strict=True):
+        _draw_ground(axes, item, value, levels, scale)
     colours = ScalarMappable(scale, loads_and_solids())
     bar = add_bar(figure, plans, colours, kind.label, extend="both", shrink=0.85, pad=0.02)
     bar.ax.yaxis.set_major_locator(FixedLocator(levels))
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    features = [feature for each in results for feature in _features(each)]
+    features = [feature for result in results for feature in _features(result)]
     handles = legend_of(without_counts(features) if len(results) > 1 else features)
     if result.run.charge.on_ground:
         handles.append(Line2D([], [], **_FINER_STYLE, label=_FINER))
@@ -183,22 +183,24 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
     """
     results, thresholds = both_results(result, beside), ground_thresholds()
     figure, plans = _plans(results)
-    levels = [each.peak_pa for each in thresholds]
-    for axes, each in zip(plans, results, strict=True):
-        x_m, y_m, inside = _on_site(each, ground_values(each, "peak"))
+    levels = [threshold.peak_pa for threshold in thresholds]
+    for axes, item in zip(plans, results, strict=True):
+        x_m, y_m, inside = _on_site(item, ground_values(item, "peak"))
         shown = axes.contourf(
             x_m, y_m, inside.T, levels=[*levels, np.inf], colors=_RISKS, extend="neither", zorder=1
         )
         shown.set_clip_path(axes.patches[0])
-        charge = each.run.site.charge
+        charge = item.run.site.charge
         for threshold in thresholds:
             distance_m = open_distance_m(threshold.peak_pa, charge)
             if isfinite(distance_m):
                 _add_circle(axes, charge, distance_m, **_OPEN_STYLE)
-        _draw_standing(axes, each)
+        _draw_standing(axes, item)
     handles: list[Artist] = [
-        Patch(facecolor=colour, edgecolor="0.4", label=_risk_words(each, result.run.site.charge))
-        for each, colour in zip(thresholds, _RISKS, strict=True)
+        Patch(
+            facecolor=colour, edgecolor="0.4", label=_risk_words(threshold, result.run.site.charge)
+        )
+        for threshold, colour in zip(thresholds, _RISKS, strict=True)
     ]
     handles.append(Line2D([], [], **_OPEN_STYLE, label="the same in the open, curve"))
     handles += legend_of(without_counts(_features(result)))
@@ -216,10 +218,10 @@ def _plans(results: Sequence[GasResult]) -> tuple[Figure, Sequence[Axes]]:
     width_in = count * _MAP_WIDTHS_IN[0 if count > 1 else 1] + 1.6
     figure = Figure(figsize=(width_in, _HEIGHT_IN), layout="constrained")
     plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
-    for axes, each in zip(plans, results, strict=True):
-        draw_plan(axes, [feature for feature in _features(each) if feature.kind is Kinds.SITE])
+    for axes, result in zip(plans, results, strict=True):
+        draw_plan(axes, [feature for feature in _features(result) if feature.kind is Kinds.SITE])
         if len(results) > 1:
-            axes.set_title(barrier_text(each.blast.layout), fontsize=11)
+            axes.set_title(barrier_text(result.blast.layout), fontsize=11)
     for axes in plans[1:]:
         axes.set_ylabel("")
         axes.tick_params(left=False, labelleft=False)
@@ -248,8 +250,8 @@ def _write(
     write_heading(figure, title, f"{subtitle}; {note}")
     plans = figure.axes[: len(results)]
     trim_height(figure, plans)
-    for axes, each in zip(plans, results, strict=True):
-        write_names(axes, _features(each))
+    for axes, result in zip(plans, results, strict=True):
+        write_names(axes, _features(result))
 
 
 def open_distance_m(peak_pa: float, charge: Charge) -> float:

@@ -128,7 +128,7 @@ def heat_map(result: BlastResult, among: Sequence[BlastResult] = ()) -> Figure:
     for axes, building in zip(panels, chosen, strict=True):
         _draw_panel(axes, result, building, scale, room_in)
     _add_colour_bar(figure, panels, scale, result)
-    destructible = any(each.capacity is not None for each in result.obstacles)
+    destructible = any(obstacle.capacity is not None for obstacle in result.obstacles)
     write_legend(figure, legend_of_loads(_features(result), destructible=destructible))
     title, subtitle = blast_title(result.blast)
     write_heading(figure, f"{title}: impulse per module", subtitle)
@@ -151,33 +151,35 @@ class _Building:
     @property
     def protected(self) -> bool:
         """Whether the load of at least one structure counts."""
-        return any(each.protected for each in self.obstacles)
+        return any(obstacle.protected for obstacle in self.obstacles)
 
     @property
     def impulse(self) -> float:
         """Sum over the structures, simulation units."""
-        return sum(each.impulse for each in self.obstacles)
+        return sum(obstacle.impulse for obstacle in self.obstacles)
 
     @property
     def modules(self) -> tuple[ModularPart, ...]:
         """The modules of the structures."""
-        return tuple(part for each in self.obstacles for part in each.parts)
+        return tuple(part for obstacle in self.obstacles for part in obstacle.parts)
 
     @property
     def size_modules(self) -> tuple[float, float]:
         """Columns and rows of modules in the rectangle around the structures."""
-        left, bottom, right, top = Rectangle.around([each.rectangle_m for each in self.obstacles])
+        left, bottom, right, top = Rectangle.around(
+            [obstacle.rectangle_m for obstacle in self.obstacles]
+        )
         return (right - left) / MODULE_SIDE_M, (top - bottom) / MODULE_SIDE_M
 
 
 def _chosen(result: BlastResult) -> list[_Building]:
     structures = result.blast.scenario.structures_with(result.blast.layout)
     buildings = [
-        _Building(name, tuple(result.obstacle(each.name) for each in parts))
+        _Building(name, tuple(result.obstacle(part.name) for part in parts))
         for name, parts in buildings_of(structures).items()
     ]
-    protected = [each for each in buildings if each.protected]
-    by_impulse = sorted(protected or buildings, key=lambda each: -each.impulse)
+    protected = [building for building in buildings if building.protected]
+    by_impulse = sorted(protected or buildings, key=lambda structure: -structure.impulse)
     return by_impulse[:_MOST_PANELS]
 
 
@@ -187,7 +189,7 @@ def _widths_in(
     """Return widths for plan and panels that leave little empty space beside them."""
     site = result.blast.scene.site
     plan = _PLAN_HEIGHT_IN * (site.right - site.left) / (site.top - site.bottom)
-    widest = max(across / along for across, along in (each.size_modules for each in chosen))
+    widest = max(across / along for across, along in (building.size_modules for building in chosen))
     panels = _PANELS_HEIGHT_IN / rows * widest * columns
     plan, panels = (
         min(max(width, least), most)
@@ -227,10 +229,12 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    for each in building.obstacles:
-        draw_loads(axes, each, scale.norm, 0.6, scale.unit.factor)
+    for obstacle in building.obstacles:
+        draw_loads(axes, obstacle, scale.norm, 0.6, scale.unit.factor)
     draw_outlines(axes, building.obstacles)
-    left, bottom, right, top = Rectangle.around([each.rectangle_m for each in building.obstacles])
+    left, bottom, right, top = Rectangle.around(
+        [obstacle.rectangle_m for obstacle in building.obstacles]
+    )
     axes.set(xlim=(left - _REACH_M, right + _REACH_M), ylim=(bottom - _REACH_M, top + _REACH_M))
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.spines[:].set_visible(False)

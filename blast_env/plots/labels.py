@@ -38,7 +38,7 @@ def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
         if feature.label:
             shared.setdefault((feature.kind, feature.bounds_m), []).append(feature)
     return tuple(
-        Label("\n".join(dict.fromkeys(each.label for each in group)), group[0])
+        Label("\n".join(dict.fromkeys(item.label for item in group)), group[0])
         for group in shared.values()
     )
 
@@ -88,15 +88,15 @@ def settled_labels(
         The labels in the given order.
     """
     solid = [
-        box(each)
-        for each in features
-        if each.kind.level >= Kinds.STRUCTURE.level or len(each.places_m) == 1
+        box(feature)
+        for feature in features
+        if feature.kind.level >= Kinds.STRUCTURE.level or len(feature.places_m) == 1
     ]
     taken, found = [*solid, *others], list[PlacedLabel]()
     for label, size in zip(labels, sizes, strict=True):
         own, inside = box(label.feature), room(label.feature)
-        free_of = [each for each in taken if each != own] + [each.place for each in found]
-        tried = [(each, [*free_of, own]) for each in _places_around(own, size, gap)]
+        free_of = [index for index in taken if index != own] + [item.place for item in found]
+        tried = [(place, [*free_of, own]) for place in _places_around(own, size, gap)]
         middle = None if inside is None else _centred(inside.centre, size)
         if middle is not None and inside is not None and inside.contains(middle):
             tried.insert(0, (middle, free_of))

@@ -97,7 +97,7 @@ class PlacingPainter:
         """Return the entries of the legend, one per item, since items differ in colour."""
         placement = LayoutState.empty(self._scenario)
         catalogue = placement.catalogue
-        numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
+        numbers = {variant.name: number for number, variant in enumerate(catalogue.variants)}
         one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
         zone = self._scenario.zone
         full = cell_features(zone, np.zeros(zone.shape, dtype=bool))

@@ -218,7 +218,7 @@ STANDING: Final = (Kinds.TERRACE, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Ki
 _ON_LEVELS: Final = (Kinds.COST_AREA, Kinds.KEEP_OUT, Kinds.BUILD_ZONE)
 """Kinds that lie on the ground or on terraces."""
 
-SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
+SITE_KINDS: Final = tuple(var for var in vars(Kinds).values() if isinstance(var, FeatureKind))
 """All kinds, the lowest first."""
 
 FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=(214, 238, 219)))
@@ -313,13 +313,13 @@ def site_features(
     zone, there = scenario.build_zone, scenario.structures_with(layout)
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
-        found += zone_features(zone, [box for each in there for box in each.boxes_m])
+        found += zone_features(zone, [box for structure in there for box in structure.boxes_m])
         found += barrier_features(scenario, layout)
     found += structure_features(there)
     found += (
-        _structure_feature(Kinds.TAKEN_AWAY, each)
-        for each in scenario.structures
-        if each not in there
+        _structure_feature(Kinds.TAKEN_AWAY, structure)
+        for structure in scenario.structures
+        if structure not in there
     )
     found += source_features(scenario.charge)
     if charge is not None:
@@ -341,23 +341,23 @@ def blast_features(
 
 def in_order(features: Iterable[Feature]) -> tuple[Feature, ...]:
     """Return features in the order of drawing: the topmost last."""
-    return tuple(sorted(features, key=lambda each: each.kind.level))
+    return tuple(sorted(features, key=lambda feature: feature.kind.level))
 
 
 def without(features: Iterable[Feature], *kinds: FeatureKind) -> tuple[Feature, ...]:
     """Return the features of all but the given kinds."""
-    return tuple(each for each in features if each.kind not in kinds)
+    return tuple(feature for feature in features if feature.kind not in kinds)
 
 
 def in_boxes(features: Iterable[Feature]) -> Iterator[Feature]:
     """Yield features, polygons as the rectangles of their modules."""
-    for each in features:
-        if not each.boxes_m:
-            yield each
-        for number, box in enumerate(each.boxes_m):
-            area = area_feature(each.kind, box, each.name)
-            label = "" if number else each.label
-            yield replace(each, places_m=area.places_m, holes_m=(), boxes_m=(), label=label)
+    for feature in features:
+        if not feature.boxes_m:
+            yield feature
+        for number, box in enumerate(feature.boxes_m):
+            area = area_feature(feature.kind, box, feature.name)
+            label = "" if number else feature.label
+            yield replace(feature, places_m=area.places_m, holes_m=(), boxes_m=(), label=label)
 
 
 def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -> Iterator[Feature]:
@@ -382,7 +382,7 @@ def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -
 
 def without_counts(features: Iterable[Feature]) -> tuple[Feature, ...]:
     """Return features whose legends do not count pieces, for pictures of several layouts."""
-    return tuple(replace(each, words=each.words.split(":")[0]) for each in features)
+    return tuple(replace(feature, words=feature.words.split(":")[0]) for feature in features)
 
 
 def area_feature(
@@ -424,7 +424,8 @@ def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Fe
         costs = area.model_dump(include={"module_cost", "cost_factor"}, exclude_none=True)
         found.append(area_feature(Kinds.COST_AREA, area.rectangle_m, area.reason, **costs))
     found += (
-        area_feature(Kinds.KEEP_OUT, each.rectangle_m, each.reason) for each in zone.keep_outs
+        area_feature(Kinds.KEEP_OUT, keep_out.rectangle_m, keep_out.reason)
+        for keep_out in zone.keep_outs
     )
     return [*found, *_way_features(zone, structures_m)]
 
@@ -450,7 +451,9 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
         for x, y in places
     ]
     free = (
-        ends for ends in arrows if not any(each.intersects_segment(*ends) for each in structures_m)
+        ends
+        for ends in arrows
+        if not any(structure_m.intersects_segment(*ends) for structure_m in structures_m)
     )
     ends = next(free, arrows[0])
     yield Feature(Kinds.ACCESS_WAY, tuple(rounded_m(*end) for end in ends), way.description)
@@ -459,8 +462,8 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
 def cell_features(zone: BuildZone, cells: BoolArray) -> Iterator[Feature]:
     """Yield areas of free and of other cells; `cells` (rows, columns) is true for free ones."""
     for kind, chosen in ((NO_CELL, ~cells), (FREE_CELL, cells)):
-        for each in rectangles_of(chosen, zone.corner_m):
-            yield area_feature(kind, each, kind.words)
+        for rectangle in rectangles_of(chosen, zone.corner_m):
+            yield area_feature(kind, rectangle, kind.words)
 
 
 def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
@@ -476,7 +479,7 @@ def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
 
 def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
     """Return the name of each item in legends, with its height and the placed part of the stock."""
-    placed = Counter(each.item if isinstance(each, Piece) else "" for each in layout)
+    placed = Counter(element.item if isinstance(element, Piece) else "" for element in layout)
     heights = {item.name: f"{item.height_m:g} m" for item in zone.items}
     stocks = {item.name: item.stock for item in zone.items}
     if not zone.items:
@@ -547,8 +550,8 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; the largest part of a building in several parts has the label."""
     structures = tuple(structures)
     for name, parts in buildings_of(structures).items():
-        largest = max(parts, key=lambda each: each.modules)
-        heights = [each.height_m for each in parts if each.height_m is not None]
+        largest = max(parts, key=lambda part: part.modules)
+        heights = [part.height_m for part in parts if part.height_m is not None]
         words = wrapped(largest.title) or name
         label = f"{words}\n{max(heights):g} m" if len(heights) == len(parts) else words
         for part in parts:
@@ -583,7 +586,7 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
         "building": structure.building,
         "title": structure.title or None,
     }
-    return {key: each for key, each in said.items() if each is not None}
+    return {key: item for key, item in said.items() if item is not None}
 
 
 def source_features(sources: Iterable[AnySource]) -> Iterator[Feature]:
@@ -648,7 +651,8 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
     for source in scenario.vehicles:
         ground = vehicle_reach(scenario, source, layout).ground(*squares_of(scenario.site))
         found += (
-            area_feature(Kinds.REACHED, each, Kinds.REACHED.words) for each in rectangles_of(ground)
+            area_feature(Kinds.REACHED, rectangle, Kinds.REACHED.words)
+            for rectangle in rectangles_of(ground)
         )
         place_m = worst_places(scenario, source, layout).places_m[0]
         found.append(stand_off_feature(scenario.loaded_walls, place_m))
@@ -699,8 +703,10 @@ def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:
     if not scenario.vehicles:
         return ""
     with_layout, unprotected = (
-        min(worst_places(scenario, source, each).stand_off_m for source in scenario.vehicles)
-        for each in (layout, ())
+        min(
+            worst_places(scenario, source, layout_tried).stand_off_m for source in scenario.vehicles
+        )
+        for layout_tried in (layout, ())
     )
     if not layout:
         return f"stand-off {unprotected:.1f} m"

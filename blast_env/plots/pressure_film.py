@@ -57,8 +57,8 @@ def pressure_footage(
         raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
     count = len(blasts)
     shots = [
-        record_planes(each, section, share_of(progress, number, count), recorders)
-        for number, each in enumerate(blasts)
+        record_planes(blast, section, share_of(progress, number, count), recorders)
+        for number, blast in enumerate(blasts)
     ]
     results = tuple(shot.result for shot in shots)
 
@@ -67,9 +67,9 @@ def pressure_footage(
         for number in range(plan.frame_count):
             yield painter.paint(plan.time_s(number), plan.real_time_factor)
 
-    layouts = " | ".join(barrier_text(each.layout) for each in blasts)
+    layouts = " | ".join(barrier_text(blast.layout) for blast in blasts)
     words = f"{blasts[-1].scenario.name}, {gas_subtitle(blasts)}, {layouts}"
-    return Footage(results, max(each.time_s for each in results), frames, words)
+    return Footage(results, max(result.time_s for result in results), frames, words)
 
 
 class PressureNow:
@@ -103,10 +103,10 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
     It is that of the incident wave of Kingery and Bulmash at the nearest structure that counts,
     within the range of their curves; reflections exceed it.
     """
-    solids = [each for each in site.structures if not each.is_barrier]
-    chosen = [each for each in solids if each.protected] or solids
+    solids = [structure for structure in site.structures if not structure.is_barrier]
+    chosen = [solid for solid in solids if solid.protected] or solids
     x_y_m = site.charge.position_m
-    distances_m = (each.rectangle_m.distance_to(x_y_m) for each in chosen)
+    distances_m = (solid.rectangle_m.distance_to(x_y_m) for solid in chosen)
     nearest_m = min(distances_m, default=_LONGEST_WAY_M)
     mass_kg = site.charge.tnt_kg
     low, high = (z * cbrt(mass_kg) for z in _CURVES)
@@ -129,8 +129,8 @@ def _counting_peaks_pa(result: GasResult) -> FloatArray:
     """Return the peaks on the cells of assessed walls, of each structure if none is protected."""
     faces = result.on_walls
     counts = [
-        (faces["structure"] == each.name) & faces["face"].isin(each.faces)
-        for each in counted_parts(result.run.site.structures)
+        (faces["structure"] == counted_part.name) & faces["face"].isin(counted_part.faces)
+        for counted_part in counted_parts(result.run.site.structures)
     ]
     peaks_pa = faces["peak_pa"][np.logical_or.reduce(counts)].to_numpy(dtype=np.float64)
     return np.asarray(peaks_pa[np.isfinite(peaks_pa)])

@@ -97,9 +97,9 @@ class VerticalSection:
 def default_section(site: BlastSite) -> VerticalSection:
     """Return the section through the charge that is best aligned with the protected structures."""
     x_m, y_m = site.charge.position_m
-    solids = [each for each in site.structures if not each.is_barrier]
-    chosen = [each for each in solids if each.protected] or solids
-    centres = [each.rectangle_m.centre for each in chosen]
+    solids = [structure for structure in site.structures if not structure.is_barrier]
+    chosen = [solid for solid in solids if solid.protected] or solids
+    centres = [solid.rectangle_m.centre for solid in chosen]
     if not centres:
         return VerticalSection("y", y_m)
     across = sum(abs(centre[0] - x_m) for centre in centres)
@@ -256,14 +256,14 @@ class PressurePainter:
             time_s: Simulated time.
             note: A remark under the time.
         """
-        for each in self._images:
-            shot = self.shots[each.shot]
-            values = shot.at(time_s, each.plane)
+        for image in self._images:
+            shot = self.shots[image.shot]
+            values = shot.at(time_s, image.plane)
             if values is None:
-                pixels = shot.opening.at(time_s, each.distances_m)
+                pixels = shot.opening.at(time_s, image.distances_m)
             else:
-                pixels = each.smooth(values)
-            each.image.set_data(self.colours(pixels.T / PA_PER_KPA))
+                pixels = image.smooth(values)
+            image.image.set_data(self.colours(pixels.T / PA_PER_KPA))
         return self.sheet.frame((f"{time_s * MS_PER_S:.1f} ms", note))
 
     def colours(self, overpressure_kpa: FloatArray) -> Frame:
@@ -280,7 +280,7 @@ class PressurePainter:
         self._add_image(number, 0)
         for outline, blocks in _wholes(shot):
             is_cut = blocks[0].base_m < height_m < _top_m(site, blocks[0])
-            self._add_solid(axes, [each.rectangle_m for each in blocks], outline, is_cut=is_cut)
+            self._add_solid(axes, [block.rectangle_m for block in blocks], outline, is_cut=is_cut)
         self.sheet.let_move(draw_features(axes, _on_ground(shot)))
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
         self.sheet.let_move([line(shot.layer_m(1), **_CUT_STYLE)])
@@ -395,7 +395,7 @@ def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
             found += ((outline, [block]) for block in outline.blocks)
         else:
             found.append((outline, list(outline.blocks)))
-    return sorted(found, key=lambda each: each[1][0].base_m)
+    return sorted(found, key=lambda item: item[1][0].base_m)
 
 
 def _solids(shot: PressureShot) -> list[Feature]:
@@ -405,7 +405,7 @@ def _solids(shot: PressureShot) -> list[Feature]:
         words = ""
         if outline.is_barrier:
             kind, fill = Kinds.BARRIER, BARRIER
-            is_low = any(_top_m(site, each) <= shot.layer_m(0) for each in outline.blocks)
+            is_low = any(_top_m(site, block) <= shot.layer_m(0) for block in outline.blocks)
             words = "barrier (low: outline)" if is_low else "barrier"
         else:
             kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT

@@ -81,11 +81,11 @@ def _groups(rows: Sequence[Sequence[FilledBay]]) -> list[tuple[Component, Member
     """Return the components, each with its bays in each row, those with most bays first."""
     found: list[tuple[Component, Members]] = []
     for row, bays in enumerate(rows):
-        for index, each in enumerate(bays):
-            for component in (each.glazing, each.wall):
+        for index, bay in enumerate(bays):
+            for component in (bay.glazing, bay.wall):
                 if component is None:
                     continue
-                storey_m = round(each.bay.height_m, 3) if isinstance(component, Wall) else 0.0
+                storey_m = round(bay.bay.height_m, 3) if isinstance(component, Wall) else 0.0
                 key = (component, storey_m)
                 members = next((own for known, own in found if known == key), None)
                 if members is None:
@@ -122,7 +122,7 @@ def _draw(
             dict(zip(own, points, strict=True)) for own, points in zip(members, loads, strict=True)
         ]
         for index in places[0].keys() & places[1].keys():
-            ends = np.array([each[index] for each in places])
+            ends = np.array([place[index] for place in places])
             axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
     axes.set(xscale="log", yscale="log", xlim=(low[1], high[1]), ylim=(low[0], high[0]))
     axes.set(xlabel="peak specific impulse (Pa s)", ylabel="peak of the bay-average pressure (kPa)")
@@ -158,7 +158,7 @@ def level_bounds(
     chosen, storey_m = component
     part = chosen.panel(storey_m) if isinstance(chosen, Wall) else chosen.pane
     for level in sorted(LevelOfProtection, reverse=True)[:-1]:
-        low, high = (np.full(len(peak_pa), each) for each in impulses_pa_s)
+        low, high = (np.full(len(peak_pa), impulse_pa_s) for impulse_pa_s in impulses_pa_s)
         for _ in range(_HALVINGS):
             middle = np.sqrt(low * high)
             allows = np.array(

@@ -52,20 +52,20 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
     figure = Figure(figsize=size_in, layout="constrained")
     panels = [figure.add_subplot(rows, columns, k + 1) for k in range(count)]
     features = site_features(scenario, layout)
-    names = {each.filled.bay.structure for each in found.threats[0].bays}
+    names = {bay.filled.bay.structure for bay in found.threats[0].bays}
     facades = shapely.union_all(
         [
             shapely.Polygon(ring)
-            for each in scenario.structures
-            for ring in _rings(each)
-            if each.name in names
+            for structure in scenario.structures
+            for ring in _rings(structure)
+            if structure.name in names
         ]
     )
     for axes, threat in zip(panels, found.threats, strict=True):
-        draw_plan(axes, [each for each in features if each.kind is Kinds.SITE])
+        draw_plan(axes, [feature for feature in features if feature.kind is Kinds.SITE])
         _draw_rings(axes, scenario, facades, found, threat)
-        for each in scenario.structures_with(layout):
-            for ring in _rings(each):
+        for structure in scenario.structures_with(layout):
+            for ring in _rings(structure):
                 axes.add_patch(Polygon(ring, facecolor="white", zorder=1.9))
         draw_features(axes, without(features, Kinds.SITE))
         draw_features(axes, [charge_feature(threat.charge, "worst place")])
@@ -101,7 +101,9 @@ def _draw_rings(
     }
     site = scenario.site
     most_m = _BEYOND * max(site.width_m, site.height_m)
-    reach_m = min(max((each for each in needed_m.values() if isfinite(each)), default=0.0), most_m)
+    reach_m = min(
+        max((distance for distance in needed_m.values() if isfinite(distance)), default=0.0), most_m
+    )
     reach_m = max(reach_m, 0.05 * most_m)
     axes.set_xlim(-reach_m, site.width_m + reach_m)
     axes.set_ylim(-reach_m, site.height_m + reach_m)

@@ -79,7 +79,7 @@ def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
 
 def draw_plan(axes: Axes, features: Sequence[Feature]) -> None:
     """Set up axes in metres with equal scales for a site, and draw its features."""
-    (site_m,) = (each.bounds_m for each in features if each.kind is Kinds.SITE)
+    (site_m,) = (feature.bounds_m for feature in features if feature.kind is Kinds.SITE)
     reach = _MARGIN * max(site_m.right, site_m.top)
     axes.set_xlim(site_m.left - reach, site_m.right + reach)
     axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
@@ -111,7 +111,7 @@ def draw_features(axes: Axes, features: Iterable[Feature]) -> list[Artist]:
             drawn.append(_sign(feature))
     for (kind, look, fill), alike in areas.items():
         # One patch, so that there is no seam between neighbours.
-        patch = PathPatch(_path_of(ring for each in alike for ring in each.rings_m))
+        patch = PathPatch(_path_of(ring for thing in alike for ring in thing.rings_m))
         patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
@@ -183,7 +183,7 @@ def legend_of_loads(features: Iterable[Feature], *, destructible: bool) -> list[
     """
     features = tuple(features)
     handles = legend_of(without(features, Kinds.BARRIER))
-    if any(each.kind is Kinds.BARRIER for each in features):
+    if any(feature.kind is Kinds.BARRIER for feature in features):
         edge = unit_interval(BARRIER)
         handles.insert(0, Patch(fill=False, edgecolor=edge, label="barrier module"))
     if destructible:
@@ -229,7 +229,9 @@ _GRID_M: Final = 1e-9  # finer differences of coordinates are rounding errors
 
 def outline_path(rectangles: Sequence[Rectangle]) -> Path:
     """Return the common outline of rectangles."""
-    joined = shapely.union_all([shapely.box(*each) for each in rectangles], grid_size=_GRID_M)
+    joined = shapely.union_all(
+        [shapely.box(*rectangle) for rectangle in rectangles], grid_size=_GRID_M
+    )
     rings = shapely.get_rings(shapely.get_parts(joined.simplify(0.0)))
     return _path_of(shapely.get_coordinates(ring)[:-1].tolist() for ring in rings)
 
@@ -242,11 +244,11 @@ def _path_of(rings: Iterable[Sequence[PointM]]) -> Path:
 def draw_outlines(axes: Axes, obstacles: Iterable[Obstacle]) -> list[Artist]:
     """Draw the outlines of structures in the colours of their roles; barriers get none."""
     drawn: list[Artist] = []
-    for each in obstacles:
-        if not each.is_barrier:
-            patch = PathPatch(outline_path(each.boxes_m), fill=False, zorder=3.0)
-            patch.set_edgecolor(unit_interval(PROTECTED if each.protected else STRUCTURE))
-            patch.set_linewidth(2.4 if each.protected else 1.6)
+    for obstacle in obstacles:
+        if not obstacle.is_barrier:
+            patch = PathPatch(outline_path(obstacle.boxes_m), fill=False, zorder=3.0)
+            patch.set_edgecolor(unit_interval(PROTECTED if obstacle.protected else STRUCTURE))
+            patch.set_linewidth(2.4 if obstacle.protected else 1.6)
             drawn.append(axes.add_patch(patch))
     return drawn
 
@@ -282,8 +284,8 @@ def draw_loads(
     )
     crosses = LineCollection([], colors=[unit_interval(INK)], linewidths=2.0 * linewidth)
     show_loads((modules, crosses), obstacle, factor)
-    for each in (modules, crosses):
-        axes.add_collection(each, autolim=False)
+    for mask in (modules, crosses):
+        axes.add_collection(mask, autolim=False)
     return modules, crosses
 
 
@@ -335,19 +337,19 @@ def write_names(axes: Axes, features: Sequence[Feature], *, inside: bool = True)
         features,
         labels,
         [(extent.width, extent.height) for extent in extents],
-        lambda each: _box(axes, each, pixels_per_pt),
-        lambda each: _box(axes, each, pixels_per_pt) if inside else None,
+        lambda label: _box(axes, label, pixels_per_pt),
+        lambda label: _box(axes, label, pixels_per_pt) if inside else None,
         Rectangle(*axes.get_window_extent().extents),
         gap=_GAP_PT * pixels_per_pt,
         far=_FAR_PT * pixels_per_pt,
         others=_other_texts(axes, texts),
     )
     to_data, written = axes.transData.inverted(), list[Artist](texts)
-    for text, each in zip(texts, settled, strict=True):
-        x, y = to_data.transform(each.place.centre).tolist()
+    for text, thing in zip(texts, settled, strict=True):
+        x, y = to_data.transform(thing.place.centre).tolist()
         text.set_position((x, y))
-        if each.leader is not None:
-            ends = to_data.transform(each.leader)
+        if thing.leader is not None:
+            ends = to_data.transform(thing.leader)
             leader = Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9)
             written.append(axes.add_line(leader))
     return written
@@ -451,7 +453,7 @@ def _wrapped(figure: Figure, subtitle: str, share: float) -> str:
     drawn.remove()
     lines = subtitle.split("\n")
     most = int(max(map(len, lines)) / wide)
-    parts = (wrap(each, most, break_long_words=False, break_on_hyphens=False) for each in lines)
+    parts = (wrap(line, most, break_long_words=False, break_on_hyphens=False) for line in lines)
     return "\n".join(part for of_line in parts for part in of_line or [""])
 
 

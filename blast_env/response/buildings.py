@@ -141,7 +141,7 @@ class LevelOfProtection(IntEnum):
         Raises:
             UnknownNameError: If no level has that label; the message suggests the nearest one.
         """
-        levels = {each.label: each for each in cls if each is not cls.BELOW_STANDARDS}
+        levels = {cl.label: cl for cl in cls if cl is not cls.BELOW_STANDARDS}
         if label not in levels:
             raise UnknownNameError("level of protection", label, levels)
         return levels[label]

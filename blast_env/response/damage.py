@@ -77,7 +77,7 @@ def bay_damages(
         for index, bay in enumerate(bays)
         for name, filled in (*bay.glazing.items(), *bay.wall.items())
     ]
-    filled, of_bay = [each for *_, each in places], [index for index, *_ in places]
+    filled, of_bay = [place for *_, place in places], [index for index, *_ in places]
     damage = _numbers(respond(filled, time_s, pressure_pa[of_bay]))
     if peak_factor > 1.0:
         times_s, sharper_pa = peak_corrected(time_s, pressure_pa, peak_factor)
@@ -171,7 +171,7 @@ def _kind(bay: Alternatives) -> tuple[object, ...]:
 def _areas(bay: Alternatives) -> tuple[float, float]:
     """Return the area of a bay, and the largest area of panes of its components, m2."""
     filled = (*bay.glazing.values(), *bay.wall.values())
-    glazed_m2 = max((each.glazed_m2 for each in filled), default=0.0)
+    glazed_m2 = max((other_glass.glazed_m2 for other_glass in filled), default=0.0)
     return filled[0].bay.area_m2, glazed_m2
 
 

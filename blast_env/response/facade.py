@@ -199,8 +199,8 @@ def _stretches(
 ) -> Iterator[tuple[int | None, WallLine | None, float, float]]:
     """Yield number and line of each wall on a side, and its ends; of a block, the side itself."""
     if lines:
-        own = ((number, each) for number, each in enumerate(lines) if each.side == side)
-        yield from ((number, each, 0.0, each.length_m) for number, each in own)
+        own = ((number, line) for number, line in enumerate(lines) if line.side == side)
+        yield from ((number, line, 0.0, line.length_m) for number, line in own)
     elif side in ("west", "east"):
         yield None, None, ground_m.bottom, ground_m.top
     else:
@@ -316,15 +316,15 @@ class FacadeResponse:
     @property
     def thin_interlayers(self) -> tuple[float, ...]:
         """Thicknesses of interlayers thinner than that of arena tests, mm."""
-        held = (each.glazing.interlayer for each in self.bays if each.glazing is not None)
+        held = (bay.glazing.interlayer for bay in self.bays if bay.glazing is not None)
         return tuple(
             sorted(
                 {
-                    each.thickness_mm
-                    for each in held
-                    if each is not None
-                    and each.material == "pvb"
-                    and each.thickness_mm < LEAST_INTERLAYER_MM
+                    interlayer.thickness_mm
+                    for interlayer in held
+                    if interlayer is not None
+                    and interlayer.material == "pvb"
+                    and interlayer.thickness_mm < LEAST_INTERLAYER_MM
                 }
             )
         )
@@ -387,12 +387,16 @@ def response_words(found: Sequence[FacadeResponse]) -> tuple[str, str, str, str]
 
     They are those of facades under one charge, in words; a dash without panes or panels.
     """
-    panes = sum(each.panes for each in found)
-    conditions = [each.worst_condition for each in found if each.panes]
-    damage = [each.worst_damage for each in found if len(each.walled)]
+    panes = sum(facade_response.panes for facade_response in found)
+    conditions = [
+        facade_response.worst_condition for facade_response in found if facade_response.panes
+    ]
+    damage = [
+        facade_response.worst_damage for facade_response in found if len(facade_response.walled)
+    ]
     return (
-        min(each.level_of_protection for each in found).label,
-        f"{sum(each.broken_panes for each in found):.1f} of {panes}",
+        min(facade_response.level_of_protection for facade_response in found).label,
+        f"{sum(facade_response.broken_panes for facade_response in found):.1f} of {panes}",
         max(conditions).words if conditions else "-",
         max(damage).name.lower() if damage else "-",
     )
@@ -404,7 +408,7 @@ def assumption_words(found: Iterable[FacadeResponse], target: LevelOfProtection)
     If every component allows the level, all of them decide; else those that do not, and only if
     each of these rests on an assumption.
     """
-    every = [ground for each in found for ground in each.grounds(target)]
+    every = [ground for facade_response in found for ground in facade_response.grounds(target)]
     failing = [ground for ground in every if not ground[1]]
     if failing and not all(is_assumed for *_, is_assumed in failing):
         return ""
@@ -421,14 +425,14 @@ def force_words(found: Iterable[FacadeResponse]) -> str:
     edges, supports = (
         np.concatenate(forces).max(initial=-1.0) * 1e-3
         for forces in (
-            [each.glazing.edge_force_n_m for each in facades],
-            [each.walls.support_force_n_m for each in facades],
+            [facade.glazing.edge_force_n_m for facade in facades],
+            [facade.walls.support_force_n_m for facade in facades],
         )
     )
     carried = []
     if edges >= 0.0:
-        panes = {each.glazing for facade in facades for each in facade.bays if each.glazing}
-        frame = 1e-3 * max(_pane(each).frame_n_m for each in panes)
+        panes = {bay.glazing for facade in facades for bay in facade.bays if bay.glazing}
+        frame = 1e-3 * max(_pane(pane).frame_n_m for pane in panes)
         carried.append(f"{edges:.1f} kN/m at pane edges (ASTM F2248: {frame:.1f})")
     if supports >= 0.0:
         carried.append(f"{supports:.1f} kN/m at the supports of wall panels")
@@ -455,9 +459,9 @@ def cells_of(peak_factor: float) -> float:
 
 def slowest_period_s(bays: Sequence[FilledBay]) -> float:
     """Return the longest natural period of the components of bays, s; 0 without components."""
-    panes = (_pane(each.glazing).system for each in bays if each.glazing is not None)
-    panels = (_panel(each.wall, each.bay.height_m).system for each in bays if each.wall is not None)
-    return max((each.period_s for each in (*panes, *panels)), default=0.0)
+    panes = (_pane(bay.glazing).system for bay in bays if bay.glazing is not None)
+    panels = (_panel(bay.wall, bay.bay.height_m).system for bay in bays if bay.wall is not None)
+    return max((pane.period_s for pane in (*panes, *panels)), default=0.0)
 
 
 def peak_corrected(
@@ -531,8 +535,8 @@ def respond(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(bays)}, {len(time_s)})"
         )
-    glazed = [index for index, each in enumerate(bays) if each.glazing is not None]
-    walled = [index for index, each in enumerate(bays) if each.wall is not None]
+    glazed = [index for index, bay in enumerate(bays) if bay.glazing is not None]
+    walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
     panes = _panes(bays)
     panels = _panels(bays)
     pushed_pa = pushes(time_s, pressure_pa)
@@ -619,12 +623,12 @@ def pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
 
 def _panes(bays: Sequence[FilledBay]) -> list[Pane]:
     """Return a pane of each bay with windows; equal panes share one object and its costly curve."""
-    return [_pane(each.glazing) for each in bays if each.glazing is not None]
+    return [_pane(bay.glazing) for bay in bays if bay.glazing is not None]
 
 
 def _panels(bays: Sequence[FilledBay]) -> list[Panel]:
     """Return the panel of each bay with a wall; equal panels share one object."""
-    return [_panel(each.wall, each.bay.height_m) for each in bays if each.wall is not None]
+    return [_panel(bay.wall, bay.bay.height_m) for bay in bays if bay.wall is not None]
 
 
 @lru_cache(maxsize=256)

@@ -410,7 +410,7 @@ def glazing_responses(
     for index, pane in enumerate(panes):
         _bend(pane, time_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
     peak_m, probability, break_s, *_ = rows.T
-    thrown_by = np.reshape([each.thrown_by for each in panes], (len(panes), 5))
+    thrown_by = np.reshape([pane.thrown_by for pane in panes], (len(panes), 5))
     stretched, speed, flight, hit = _thrown(rows, thrown_by)
     retained = stretched <= 1.0
     condition = np.where(

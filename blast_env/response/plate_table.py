@@ -81,7 +81,7 @@ def _table() -> tuple[FloatArray, FloatArray]:
     """Return aspect ratios, and per ratio and deflection: ln load, ln risk, K_LM, mean(phi)."""
     text = files("blast_env.response").joinpath("data", TABLE).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
-    rows = np.array([[float(each) for each in line.split(",")] for line in lines[1:]])
+    rows = np.array([[float(word) for word in line.split(",")] for line in lines[1:]])
     values = rows[:, 2:].reshape(len(ASPECT_RATIOS), len(DEFLECTIONS), 4)
     values = np.concatenate([np.log(values[..., :2]), values[..., 2:]], axis=-1)
     return np.array(ASPECT_RATIOS), values

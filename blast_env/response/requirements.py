@@ -14,9 +14,11 @@ from blast_env.units import PA_PER_KPA
 from blast_env.values import plain_number
 
 _CONDITIONS: Final = {
-    each.label: each for each in GlazingCondition if each <= GlazingCondition.WITHIN_3_M
+    condition.label: condition
+    for condition in GlazingCondition
+    if condition <= GlazingCondition.WITHIN_3_M
 }
-_RATINGS: Final = {each.rating: each for each in _CONDITIONS.values()} | {
+_RATINGS: Final = {condition.rating: condition for condition in _CONDITIONS.values()} | {
     "C": GlazingCondition.RETAINED
 }
 

@@ -83,7 +83,7 @@ class Limits:
 def _measure(values: FloatArray, limits: Sequence[float | None], first: int) -> FloatArray:
     at = [(0.0, float(first))]
     at += [(limit, level) for level, limit in enumerate(limits, start=1) if limit is not None]
-    known, levels = (np.array(each) for each in zip(*at, strict=True))
+    known, levels = (np.array(coordinate) for coordinate in zip(*at, strict=True))
     measure = np.interp(values, known, levels)
     if levels[-1] < DamageLevel.BLOWOUT:
         return measure
@@ -92,7 +92,7 @@ def _measure(values: FloatArray, limits: Sequence[float | None], first: int) -> 
 
 def damage_level(measure: FloatArray) -> list[DamageLevel]:
     """Return the levels of damage measures."""
-    return [DamageLevel(int(min(each, 4.0))) for each in measure.tolist()]
+    return [DamageLevel(int(min(value, 4.0))) for value in measure.tolist()]
 
 
 _PDC_TABLES: Final = "PDC-TR 06-08, tables 3-1 and 3-3, as others quote them"
@@ -380,12 +380,12 @@ class Panel:
 
         A membrane of tension T takes over where 8 T x / L^2 exceeds the resistance in bending.
         """
-        bends = [section.moment_at(each) / section.moment_n for each in _ROTATIONS_DEG]
+        bends = [section.moment_at(value) / section.moment_n for value in _ROTATIONS_DEG]
         arm_m = self.span_m if self.supports is Supports.CANTILEVER else 0.5 * self.span_m
         deflection_m = arm_m * np.tan(np.radians(_ROTATIONS_DEG))
         growth = np.array(bends)
         if self.supports is not Supports.CANTILEVER:
-            tension_n = np.array([section.membrane_n(each) for each in _ROTATIONS_DEG])
+            tension_n = np.array([section.membrane_n(value) for value in _ROTATIONS_DEG])
             growth = np.maximum(growth, 8.0 * tension_n * deflection_m / self.span_m**2 / cap_pa)
         return deflection_m, growth
 

@@ -85,7 +85,7 @@ def stock_barriers() -> Mapping[str, StockBarrier]:
     """Return the barriers of the stock list by name."""
     text = files(__package__).joinpath(_FILE).read_text(encoding="utf-8")
     listed = tomllib.loads(text)
-    barriers = {name: StockBarrier.model_validate(each) for name, each in listed.items()}
+    barriers = {name: StockBarrier.model_validate(item) for name, item in listed.items()}
     return MappingProxyType(barriers)
 
 
@@ -325,10 +325,20 @@ class Catalogue:
             for turned in item.orientations
         )
         variants += tuple(
-            Variant(number, each.name, False, 0, 0, 0.0, each.cost, False, kind=_KINDS[type(each)])
-            for number, each in enumerate(measures, start=len(items))
+            Variant(
+                number,
+                measure.name,
+                False,
+                0,
+                0,
+                0.0,
+                measure.cost,
+                False,
+                kind=_KINDS[type(measure)],
+            )
+            for number, measure in enumerate(measures, start=len(items))
         )
-        names = (*(item.name for item in items), *(each.name for each in measures))
+        names = (*(item.name for item in items), *(measure.name for measure in measures))
         stocks = (*(item.stock for item in items), *(1 for _ in measures))
         return cls(variants, names, stocks, shape)
 
@@ -342,7 +352,7 @@ class Catalogue:
     @property
     def sizes(self) -> Iterator[tuple[int, int]]:
         """Rows and columns of cells of each variant; none for measures."""
-        return ((each.rows, each.columns) for each in self.variants)
+        return ((variant.rows, variant.columns) for variant in self.variants)
 
     @property
     def has_items(self) -> bool:
@@ -504,7 +514,7 @@ class Catalogue:
     @cached_property
     def _numbers(self) -> dict[tuple[str, bool], int]:
         """The number of each variant by name and orientation."""
-        return {(each.name, each.turned): i for i, each in enumerate(self.variants)}
+        return {(variant.name, variant.turned): i for i, variant in enumerate(self.variants)}
 
 
 _PAIR: Final = "must be a pair of integers (row, column)"

@@ -73,7 +73,7 @@ def _count_problems(scenario: Content) -> Iterator[Problem]:
 
 def _vehicle_count_problems(scenario: Content) -> Iterator[Problem]:
     """Yield the problems of too many places of vehicles, with and without a motion."""
-    vehicles = [each for each in scenario.charge if isinstance(each, VehicleSource)]
+    vehicles = [source for source in scenario.charge if isinstance(source, VehicleSource)]
     places = len(vehicles) * places_on(scenario.site)
     if places > MOST_PLACES:
         yield Problem(
@@ -81,7 +81,7 @@ def _vehicle_count_problems(scenario: Content) -> Iterator[Problem]:
             f"has {len(vehicles)} vehicles, whose charges may go off at {places:,} places of the"
             f" site, must have at most {MOST_PLACES:,}",
         )
-    moved = sum(each.motion is not None for each in vehicles)
+    moved = sum(vehicle.motion is not None for vehicle in vehicles)
     rows, columns = places_shape(scenario.site.width_m, scenario.site.height_m)
     if moved * rows * columns > MOST_SPEED_PLACES:
         yield Problem(
@@ -105,7 +105,7 @@ def _removable_problems(scenario: Content) -> Iterator[Problem]:
     """Check that removable structures exist, and are neither protected nor otherwise needed."""
     if scenario.build_zone is None:
         return
-    structures = {each.name: each for each in scenario.structures}
+    structures = {structure.name: structure for structure in scenario.structures}
     first_use: dict[str, str] = {}
     for number, removable in enumerate(scenario.build_zone.removable):
         for place, name in enumerate(removable.structures):
@@ -128,7 +128,7 @@ def _objective_problems(scenario: Content) -> Iterator[Problem]:
     objective, zone = scenario.objective, scenario.build_zone
     if not objective.is_response:
         return
-    facades = [each.facade for each in scenario.structures if each.protected]
+    facades = [structure.facade for structure in scenario.structures if structure.protected]
     keys = [key for facade in facades if facade is not None for key, _ in facade.names()]
     wanted = "glazing" if objective.measure == "glazing" else ""
     if not any(key.endswith(wanted) for key in keys):
@@ -176,7 +176,7 @@ def _repeated_names(
 def _structure_problems(scenario: Content) -> Iterator[Problem]:
     """Check that structures lie inside the site without overlaps, and their number of modules."""
     stock = 0 if scenario.build_zone is None else scenario.build_zone.stock
-    modules = sum(each.modules for each in scenario.structures) + stock
+    modules = sum(structure.modules for structure in scenario.structures) + stock
     if modules > MOST_MODULES:
         with_stock = f", the stock of {stock:,} among them" if stock else ""
         message = f"have {modules:,} modules together{with_stock}, must have at most"
@@ -326,7 +326,9 @@ def _stopping_problems(
         yield Problem(key, message)
         return
     # Adjoining cells leave no gap: their rectangle stops a vehicle as they do.
-    full = Obstacles(stops=tuple(zone.cells_rectangle_m(*each) for each in stacked_runs(cells)))
+    full = Obstacles(
+        stops=tuple(zone.cells_rectangle_m(*stacked_run) for stacked_run in stacked_runs(cells))
+    )
     stand_off_m = ground.worst_places().stand_off_m
     if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
         message = (

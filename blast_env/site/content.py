@@ -96,7 +96,7 @@ class Content(Section):
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that remain with a layout."""
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
-        return tuple(each for each in self.structures if each.name not in away)
+        return tuple(structure for structure in self.structures if structure.name not in away)
 
     @property
     def loaded_walls(self) -> tuple[Wall, ...]:

@@ -86,9 +86,9 @@ class NamedBay:
 
     def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
         """Return its components, and those that measures would put there."""
-        reached = [self.hardened([each]) for each in measures]
-        glasses = dict.fromkeys(each.glazing for each in (self, *reached) if each.glazing)
-        walls = dict.fromkeys(each.wall for each in (self, *reached) if each.wall)
+        reached = [self.hardened([measure]) for measure in measures]
+        glasses = dict.fromkeys(bay.glazing for bay in (self, *reached) if bay.glazing)
+        walls = dict.fromkeys(bay.wall for bay in (self, *reached) if bay.wall)
         return Alternatives(
             self.bay.name,
             self.bay.structure,
@@ -194,8 +194,8 @@ def hardening_problems(
         measures: The measures.
     """
     known = {**catalogue(), **own}
-    names = [each.name for each in structures]
-    bays = [bay for each in structures for bay in named_bays(each)]
+    names = [structure.name for structure in structures]
+    bays = [bay for structure in structures for bay in named_bays(structure)]
     for index, measure in enumerate(measures):
         where = f"build_zone.hardening[{index}]"
         unknown = {i: name for i, name in enumerate(measure.structures or ()) if name not in names}
@@ -218,7 +218,7 @@ def hardening_problems(
 def _kind_problem(where: str, name: str, known: Components) -> Iterator[Problem]:
     """Yield a problem if a name is not that of a component of the key's kind."""
     kind = Glazing if where.endswith("glazing") else Wall
-    fitting = [each for each, component in known.items() if isinstance(component, kind)]
+    fitting = [item for item, component in known.items() if isinstance(component, kind)]
     if name not in fitting:
         yield Problem(where, unknown_name("component", name, fitting))
 

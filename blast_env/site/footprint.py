@@ -53,7 +53,7 @@ class Footprint:
     @cached_property
     def grid(self) -> tuple[Place, BoolArray]:
         """Lower left corner of the modules, and where there is one (rows, columns)."""
-        left, bottom, right, top = (each / MODULE_SIDE_M for each in self.polygon.bounds)
+        left, bottom, right, top = (bound / MODULE_SIDE_M for bound in self.polygon.bounds)
         first = int(np.floor(left)), int(np.floor(bottom))
         columns, rows = int(np.ceil(right)) - first[0], int(np.ceil(top)) - first[1]
         x_m = MODULE_SIDE_M * (first[0] + np.arange(columns) + 0.5) + _OFF_CENTRE_M[0]
@@ -63,7 +63,7 @@ class Footprint:
         used = [np.flatnonzero(filled.any(axis=axis)) for axis in (1, 0)]
         if not len(used[0]):
             return (first[0] * MODULE_SIDE_M, first[1] * MODULE_SIDE_M), filled[:0, :0]
-        (low, high), (begin, end) = ((int(each[0]), int(each[-1]) + 1) for each in used)
+        (low, high), (begin, end) = ((int(name[0]), int(name[-1]) + 1) for name in used)
         corner_m = MODULE_SIDE_M * (first[0] + begin), MODULE_SIDE_M * (first[1] + low)
         return corner_m, filled[low:high, begin:end]
 
@@ -121,12 +121,12 @@ class Footprint:
         faces = np.asarray(np.round(np.hstack((centres_m, outwards)), 9), dtype=np.float64)
         places, owner = np.unique(faces, axis=0, return_inverse=True)
         number = np.zeros(len(places), dtype=np.int64)
-        normals = np.array([each.normal for each in self.walls]).T
+        normals = np.array([wall.normal for wall in self.walls]).T
         step = max(_PAIRS // len(self.walls), 1)
         for first in range(0, len(places), step):
             some: FloatArray = places[first : first + step]
             cosines = some[:, 2:] @ normals
-            away_m = np.stack([each.distances_m(some[:, :2]) for each in self.walls], axis=1)
+            away_m = np.stack([wall.distances_m(some[:, :2]) for wall in self.walls], axis=1)
             away_m = np.where(cosines > _LEAST_COSINE, away_m - _TIE_M * cosines, np.inf)
             number[first : first + step] = away_m.argmin(axis=1)
         cosine = (places[:, 2:] * normals.T[number]).sum(axis=1)
@@ -138,7 +138,10 @@ def footprint_problem(outline_m: Sequence[Place], courtyards_m: Sequence[Sequenc
     """Return the reason why rings are no footprint, or an empty text."""
     for words, ring in (
         ("the outline", outline_m),
-        *((f"courtyard {number}", each) for number, each in enumerate(courtyards_m, start=1)),
+        *(
+            (f"courtyard {number}", courtyard_m)
+            for number, courtyard_m in enumerate(courtyards_m, start=1)
+        ),
     ):
         if len(set(ring)) < 3:
             return f"{words} has {len(set(ring))} different corners, must have at least 3"
@@ -163,7 +166,7 @@ def _place(reason: str) -> str:
     """Return the place in an explanation of shapely: `Self-intersection[3 4]`."""
     _, bracket, rest = reason.partition("[")
     values = rest.rstrip("]").split()
-    return f"at ({', '.join(f'{float(each):g}' for each in values[:2])}) m" if bracket else reason
+    return f"at ({', '.join(f'{float(value):g}' for value in values[:2])}) m" if bracket else reason
 
 
 @lru_cache(maxsize=512)
@@ -181,12 +184,16 @@ def footprint_of(outline_m: Ring, courtyards_m: tuple[Ring, ...] = ()) -> Footpr
     if problem:
         raise BlastEnvError(problem)
     outer = _turned(outline_m, is_left=True)
-    return Footprint((outer, *(_turned(each, is_left=False) for each in courtyards_m)))
+    return Footprint(
+        (outer, *(_turned(courtyard_m, is_left=False) for courtyard_m in courtyards_m))
+    )
 
 
 def _turned(ring: Ring, *, is_left: bool) -> Ring:
     """Return a ring counterclockwise or clockwise, without repeated corners."""
-    kept = [each for each, after in zip(ring, (*ring[1:], ring[0]), strict=True) if each != after]
+    kept = [
+        point for point, after in zip(ring, (*ring[1:], ring[0]), strict=True) if point != after
+    ]
     counterclockwise = bool(shapely.is_ccw(shapely.LinearRing(kept)))
     return tuple(kept) if counterclockwise == is_left else tuple(reversed(kept))
 

@@ -27,7 +27,7 @@ def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | N
     It is 12 m, or 6 m more than the highest structure or barrier if that is more.
     """
     structures = tuple(structures)
-    heights = [each.height_m for each in structures]
+    heights = [structure.height_m for structure in structures]
     heights.append(None if zone is None else highest_top_m(zone, structures))
     highest = max((height for height in heights if height is not None), default=0.0)
     return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
@@ -50,7 +50,7 @@ def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tu
     Charges and vehicles are ignored. An item that fits nowhere has 0.
     """
     structures = tuple(structures)
-    terraces_m = (box for each in structures if each.carries for box in each.boxes_m)
+    terraces_m = (box for structure in structures if structure.carries for box in structure.boxes_m)
     here = (box.overlaps(zone.rectangle_m) for box in terraces_m)
     return _grounds_m(zone, structures) if any(here) else (0.0,) * max(len(zone.items), 1)
 
@@ -59,7 +59,7 @@ def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tu
 def _grounds_m(zone: BuildZone, structures: tuple[AnyStructure, ...]) -> tuple[float, ...]:
     free = usable_cells(Surroundings(zone, structures, (), 0.0, None))
     ground = ground_m(structures, zone.boxes)
-    variants = [each for each in zone.catalogue.variants if not each.is_measure]
+    variants = [variant for variant in zone.catalogue.variants if not variant.is_measure]
     found = [0.0] * max(len(zone.items), 1)
     for height_m in np.unique(ground[free]).tolist():  # the lowest first
         taken = counts_before(~free | (ground != height_m))
@@ -87,7 +87,7 @@ def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructu
     )
     if structure.footprint is not None and depth_m > 0.0:  # boxes of a polygon share sides
         place_m = np.array([(x_m, y_m)])
-        depth_m = min(float(each.distances_m(place_m)[0]) for each in structure.footprint.walls)
+        depth_m = min(float(wall.distances_m(place_m)[0]) for wall in structure.footprint.walls)
     if structure.base_m > 0.0:
         depth_m = min(depth_m, z_m - structure.base_m)
     return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
@@ -101,7 +101,7 @@ def height_notes(
 ) -> tuple[str, ...]:
     """Return the features of a scenario that an engine without heights ignores, in sentences."""
     structures = tuple(structures)
-    walls = any(each.height_m is not None for each in structures)
+    walls = any(structure.height_m is not None for structure in structures)
     walls |= zone is not None and bool(zone.items or zone.height_m)
     raised = any(source.height_m > 0.0 for source in sources)
     notes = []
@@ -112,7 +112,7 @@ def height_notes(
         )
     if raised:
         notes.append("The model has no heights: the charge counts as if it lay on the ground.")
-    if any(each.faces != WALLS for each in structures):
+    if any(structure.faces != WALLS for structure in structures):
         notes.append("The load on all walls counts, not only on those that the scenario names.")
     if gauges:
         notes.append("The model has no air pressure: the scenario's gauges record nothing.")

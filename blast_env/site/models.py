@@ -75,8 +75,8 @@ class Scenario(Content):
 
     def named_bays(self, layout: Iterable[Element] = ()) -> tuple[NamedBay, ...]:
         """Return the bays with the names of their components, with a layout's measures taken."""
-        taken = {each.item for each in layout if isinstance(each, Measure)}
-        measures = [each for each in self._hardening if each.name in taken]
+        taken = {element.item for element in layout if isinstance(element, Measure)}
+        measures = [hardening for hardening in self._hardening if hardening.name in taken]
         return tuple(
             bay.hardened(measures) for structure in self.structures for bay in named_bays(structure)
         )
@@ -165,8 +165,10 @@ class Scenario(Content):
         """
         zone = self.build_zone
         built = [
-            each.model_dump(mode="json", include=fields_with(type(each), Hashed.OF_PLACES))
-            for each in self.structures
+            structure.model_dump(
+                mode="json", include=fields_with(type(structure), Hashed.OF_PLACES)
+            )
+            for structure in self.structures
         ]
         content = None if zone is None else hashed_content(zone, Hashed.NOT_OF_PLACES)
         return digest_of({"build_zone": content, "structures": built})
@@ -311,7 +313,7 @@ class Scenario(Content):
             )
         known = self._known
         for kind, name in facade.items():  # here, once for all structures
-            names = [each for each, component in known.items() if component.kind == kind]
+            names = [item for item, component in known.items() if component.kind == kind]
             if name not in names:
                 raise UnknownNameError(kind, name, names)
         for structure in without:
@@ -326,12 +328,16 @@ class Scenario(Content):
     @property
     def building_names(self) -> dict[str, str]:
         """Name of each structure's building, by the structure's name."""
-        return {each.name: each.building_name for each in self.structures}
+        return {structure.name: structure.building_name for structure in self.structures}
 
     def title_of(self, name: str) -> str:
         """Return the title of a structure or building, else its name."""
-        parts = (each for each in self.structures if name in (each.name, each.building_name))
-        return next((each.title for each in parts if each.title), name)
+        parts = (
+            structure
+            for structure in self.structures
+            if name in (structure.name, structure.building_name)
+        )
+        return next((part.title for part in parts if part.title), name)
 
     def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
         """Draw independent charges: a source by its weight, then a place in it.

@@ -21,7 +21,7 @@ def obstacles_of(
     Raises:
         LayoutError: If there is no such item, or it cannot be turned.
     """
-    terraces = [each for each in structures if each.carries]
+    terraces = [structure for structure in structures if structure.carries]
     stops: list[Rectangle] = []
     solid: list[Rectangle] = []
     rated: list[RatedPiece] = []

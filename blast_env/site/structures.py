@@ -90,7 +90,7 @@ class FacadeSection(Section):
 
     def of_side(self, side: WallName) -> FacadePart:
         """Return the part that is all bays of a side; an empty one if there is none."""
-        own = (each for each in self.parts if each.walls == (side,) and each.storeys is None)
+        own = (part for part in self.parts if part.walls == (side,) and part.storeys is None)
         return next(own, FacadePart(walls=(side,)))
 
     def with_side(self, side: WallName, **names: str | None) -> Self:
@@ -102,7 +102,7 @@ class FacadeSection(Section):
         """
         before = self.of_side(side)
         own = before.model_copy(update=names)
-        parts = [each for each in self.parts if each != before]
+        parts = [part for part in self.parts if part != before]
         parts += [own] if own.glazing or own.wall else []
         return self.model_copy(update={"parts": tuple(parts)})
 
@@ -333,7 +333,9 @@ AnyStructure = Annotated[
 
 def loaded_walls(structures: Iterable[AnyStructure]) -> tuple[Wall, ...]:
     """Return the walls of protected structures that their `faces` name."""
-    return tuple(wall for each in structures if each.protected for wall in _faces_of(each))
+    return tuple(
+        wall for structure in structures if structure.protected for wall in _faces_of(structure)
+    )
 
 
 def _faces_of(structure: AnyStructure) -> Iterator[Wall]:
@@ -353,6 +355,6 @@ def _faces_of(structure: AnyStructure) -> Iterator[Wall]:
 def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStructure]]:
     """Return structures by the names of their buildings, in order."""
     buildings: dict[str, list[AnyStructure]] = {}
-    for each in structures:
-        buildings.setdefault(each.building_name, []).append(each)
+    for structure in structures:
+        buildings.setdefault(structure.building_name, []).append(structure)
     return buildings

@@ -12,12 +12,12 @@ from blast_env.site.structures import AnyStructure
 
 def terrace_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:
     """Yield the problems of terraces, each of which must be solid and have a height."""
-    for index, each in enumerate(structures):
-        if each.carries and each.height_m is None:
+    for index, structure in enumerate(structures):
+        if structure.carries and structure.height_m is None:
             message = "is true, needs the structure's height_m: barriers stand on its top"
             yield Problem(f"structures[{index}].carries", message)
-        if each.carries and each.base_m > 0.0:
-            message = f"is {each.base_m:g}, must be 0: a terrace is solid"
+        if structure.carries and structure.base_m > 0.0:
+            message = f"is {structure.base_m:g}, must be 0: a terrace is solid"
             yield Problem(f"structures[{index}].base_m", message)
 
 
@@ -44,11 +44,11 @@ def levels_of(
     structures: Iterable[AnyStructure], rectangle_m: Rectangle
 ) -> dict[float, list[Rectangle]]:
     """Return the parts of a rectangle by the height of the ground below them, m."""
-    terraces = [each for each in _terraces(structures) if each[0].overlaps(rectangle_m)]
+    terraces = [terrace for terrace in _terraces(structures) if terrace[0].overlaps(rectangle_m)]
     left, bottom, right, top = rectangle_m
-    plans = [each for each, _ in terraces]
-    xs = sorted({left, right, *(x for each in plans for x in each[::2] if left < x < right)})
-    ys = sorted({bottom, top, *(y for each in plans for y in each[1::2] if bottom < y < top)})
+    plans = [item for item, _ in terraces]
+    xs = sorted({left, right, *(x for plan in plans for x in plan[::2] if left < x < right)})
+    ys = sorted({bottom, top, *(y for plan in plans for y in plan[1::2] if bottom < y < top)})
     across, up = np.array(xs)[np.newaxis], np.array(ys)[:, np.newaxis]
     ground = _highest(terraces, (across[:, :-1], up[:-1], across[:, 1:], up[1:]))
     return {
@@ -83,6 +83,6 @@ def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -
 
 def _terraces(structures: Iterable[AnyStructure]) -> Iterator[tuple[Rectangle, float]]:
     """Yield plan and height of each terrace."""
-    for each in structures:
-        if each.carries and each.height_m is not None:
-            yield from ((box, each.height_m) for box in each.boxes_m)
+    for structure in structures:
+        if structure.carries and structure.height_m is not None:
+            yield from ((box, structure.height_m) for box in structure.boxes_m)

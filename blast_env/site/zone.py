@@ -159,14 +159,14 @@ class BuildZone(Section):
 
     def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
         """Return the names of the structures that a layout removes."""
-        taken = {each.item for each in layout if isinstance(each, Removal)}
-        own = (each.structures for each in self.removable if each.name in taken)
+        taken = {element.item for element in layout if isinstance(element, Removal)}
+        own = (removal.structures for removal in self.removable if removal.name in taken)
         return frozenset(name for names in own for name in names)
 
     @property
     def may_be_taken_away(self) -> frozenset[str]:
         """The names of the structures that a layout can remove."""
-        return frozenset(name for each in self.removable for name in each.structures)
+        return frozenset(name for removal in self.removable for name in removal.structures)
 
     def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
         """Return the modules of a layout, piece by piece.
@@ -493,7 +493,7 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
     clearance_m = surroundings.zone.clearance_m
     ground = ground_m(surroundings.structures, boxes)
     for structure in surroundings.structures:
-        distances = np.min([box_distances_m(each, boxes) for each in structure.boxes_m], axis=0)
+        distances = np.min([box_distances_m(box_m, boxes) for box_m in structure.boxes_m], axis=0)
         if structure.carries:  # cells on a terrace need no clearance from it
             distances = np.where(ground < (structure.height_m or inf), distances, inf)
         yield (

@@ -34,9 +34,9 @@ def place_count_problems(zone: BuildZone) -> Iterator[Problem]:
         message = f"make {places:,} places of pieces in the zone, must make at most {MOST_PLACES:,}"
         yield Problem("build_zone.items", message)
     covered = sum(
-        each.rows * each.columns * max(zone.rows - each.rows + 1, 0) * right
-        for each in variants
-        if (right := zone.columns - each.columns + 1) > 0
+        variant.rows * variant.columns * max(zone.rows - variant.rows + 1, 0) * right
+        for variant in variants
+        if (right := zone.columns - variant.columns + 1) > 0
     )
     if covered > MOST_COVERED:
         message = f"cover {covered:,} cells at all their places together, must cover at most"
@@ -54,7 +54,7 @@ def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
     elif zone.stock > (usable := int(cells.usable.sum())):
         message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
         yield Problem("build_zone.stock", message)
-    in_stock = [cells.catalogue.stocks[each.item] > 0 for each in cells.catalogue.variants]
+    in_stock = [cells.catalogue.stocks[variant.item] > 0 for variant in cells.catalogue.variants]
     available = cells.fits & np.array(in_stock)[:, np.newaxis, np.newaxis]
     if zone.access_way is not None:
         closing = _closing(zone, zone.access_way, cells)
@@ -114,7 +114,7 @@ def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
     places = [f"build_zone.items[{index}]" for index in range(len(zone.items))]
     places += [f"build_zone.hardening[{index}]" for index in range(len(zone.hardening))]
     places += [f"build_zone.removable[{index}]" for index in range(len(zone.removable))]
-    names = [each.name for each in (*zone.items, *zone.measures)]
+    names = [item.name for item in (*zone.items, *zone.measures)]
     for index, name in enumerate(names):
         first = names.index(name)
         if first != index:
@@ -127,7 +127,7 @@ def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
         message = f"is {zone.stock}, must be at most {pieces}, the number of pieces of all items"
         yield Problem("build_zone.stock", message)
     for index, item in enumerate(zone.items):
-        own = [each.item == index for each in cells.catalogue.variants]
+        own = [variant.item == index for variant in cells.catalogue.variants]
         if cells.fits[own].any():
             continue
         size = f"{item.length_modules} x {item.thickness_modules} modules"

@@ -131,10 +131,10 @@ class Visibility:
         """
         if not cells or not len(self.weight):
             return 0.0
-        rows, columns = zip(*(each[:2] for each in cells), strict=True)
+        rows, columns = zip(*(cell[:2] for cell in cells), strict=True)
         cut = self.cut[:, rows, columns]
         if heights_m is not None:
-            tall = np.array([np.inf if each is None else each for each in heights_m])
+            tall = np.array([np.inf if height_m is None else height_m for height_m in heights_m])
             cut = cut & (self.height_m[:, rows, columns] < tall)
         share = float(self.weight @ cut.any(axis=1) / self.weight.sum())
         return min(share, 1.0)  # rounding
@@ -267,7 +267,9 @@ class SiteMeasures:
 def cut_share_of(lines: Visibility, placement: LayoutState) -> float:
     """Return the share of the lines that the placed modules cut, with their heights."""
     modules = placement.modules
-    return lines.cut_share([each.cell for each in modules], [each.height_m for each in modules])
+    return lines.cut_share(
+        [module.cell for module in modules], [module.height_m for module in modules]
+    )
 
 
 def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
@@ -327,7 +329,9 @@ def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
     cut = np.zeros((len(lines.weight), len(catalogue.variants), *catalogue.shape), dtype=bool)
     by_height = {
         height_m: lines.cut_by(height_m)
-        for height_m in {each.height_m for each in catalogue.variants if not each.is_measure}
+        for height_m in {
+            variant.height_m for variant in catalogue.variants if not variant.is_measure
+        }
     }
     for number, variant in enumerate(catalogue.variants):
         if variant.is_measure:
@@ -407,7 +411,7 @@ def _random_pieces_share(placement: LayoutState, lines: Visibility, cut: BoolArr
     zone = placement.scenario.zone
     legal = placement.legal.reshape(len(placement.legal), -1)
     cut = cut.reshape(len(lines.weight), *legal.shape)
-    numbers = np.array([each.item for each in placement.catalogue.variants])
+    numbers = np.array([variant.item for variant in placement.catalogue.variants])
     there = [number for number in range(len(zone.items)) if legal[numbers == number].any()]
     mean_cost = float(np.mean([zone.items[number].cost for number in there]))
     pieces = zone.stock if zone.budget is None else min(zone.stock, zone.budget / mean_cost)

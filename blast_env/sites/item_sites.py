@@ -341,7 +341,7 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
         buildings.append(Rectangle.from_corner(corner_m, (depth_m, facade_m)))
         bottom += facade_m + _BETWEEN_M
     left = draws.length_m(ranges.zone_from_border_m)
-    middles = (middle_m + sum(each.centre[1] for each in buildings) / len(buildings)) / 2.0
+    middles = (middle_m + sum(building.centre[1] for building in buildings) / len(buildings)) / 2.0
     low = on_grid(middles - ranges.zone_side_m / 2.0)
     low = min(max(low, 0.0), ranges.side_m - ranges.zone_side_m)
     zone = Rectangle.from_corner((left, low), (ranges.zone_side_m,) * 2)
@@ -390,7 +390,7 @@ def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> lis
         size_m = (draws.length_m(ranges.shed_side_m), draws.length_m(ranges.shed_side_m))
         far_m = ranges.side_m - MARGIN_M
         area = Rectangle(2.0 * _ROAD_M, MARGIN_M, far_m, far_m)
-        others = [SpacedObstacle(each, _BETWEEN_M) for each in plan.buildings]
+        others = [SpacedObstacle(building, _BETWEEN_M) for building in plan.buildings]
         shed = draw_place(draws, area, size_m, [*others, SpacedObstacle(plan.zone, 0.0)])
         if shed is not None:
             structures.append(structure("shed", shed, height_m=STOREY_M))
@@ -463,11 +463,11 @@ def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list
             places.append(("the path to the door must stay open", path))
     for _ in range(draws.count(ranges.trees)):
         side_m = draws.length_m(ranges.tree_side_m)
-        others = [SpacedObstacle(each, 0.0) for _, each in places]
+        others = [SpacedObstacle(place, 0.0) for _, place in places]
         tree = draw_place(draws, yard(zone, building), (side_m, side_m), others)
         if tree is not None:
             places.append(("tree", tree))
-    return [ground(each, reason=reason) for reason, each in places]
+    return [ground(place, reason=reason) for reason, place in places]
 
 
 def _access_way(

@@ -272,11 +272,11 @@ def _draw_keep_outs(draws: Draws, ranges: SiteRanges, plan: _Plan) -> list[dict[
     trees = draws.count(ranges.trees)
     squares += [("tree", draws.length_m(ranges.tree_side_m)) for _ in range(trees)]
     for reason, side_m in squares:
-        others = [SpacedObstacle(each, 0.0) for _, each in places]
+        others = [SpacedObstacle(place, 0.0) for _, place in places]
         place = draw_place(draws, yard(plan.zone, plan.building), (side_m, side_m), others)
         if place is not None:
             places.append((reason, place))
-    return [ground(each, reason=reason) for reason, each in places]
+    return [ground(place, reason=reason) for reason, place in places]
 
 
 def _draw_duct(draws: Draws, ranges: SiteRanges, zone: Rectangle) -> dict[str, Any]:

@@ -60,15 +60,15 @@ def _value(key: str, value: Any, height_m: float) -> Any:
     if key == "size_m":
         return value[::-1]
     if key == "outline_m":
-        return tuple(_vertex(each, height_m) for each in value)
+        return tuple(_vertex(item, height_m) for item in value)
     if key == "courtyards_m":
-        return tuple(_value("outline_m", each, height_m) for each in value)
+        return tuple(_value("outline_m", item, height_m) for item in value)
     if key in ("faces", "walls"):
         return tuple(_TURNED_WALL[wall] for wall in value)
     if key == "between":
         return _ACROSS[value]
     if isinstance(value, list | tuple):
-        return tuple(_value("", each, height_m) for each in value)
+        return tuple(_value("", item, height_m) for item in value)
     return value
 
 

@@ -121,9 +121,11 @@ def _read_astm(found: re.Match[str]) -> dict[str, float | str]:
         ValueError: If the standard has no such code.
     """
     vehicle, speed, penetration = found.groups()
-    speeds = [each for each in _ASTM_KM_H if each != "60" or vehicle in _ASTM_CARS]
+    speeds = [
+        speed_km_h for speed_km_h in _ASTM_KM_H if speed_km_h != "60" or vehicle in _ASTM_CARS
+    ]
     if speed not in speeds:
-        known = ", ".join(f"{vehicle}{each}" for each in speeds)
+        known = ", ".join(f"{vehicle}{speed}" for speed in speeds)
         raise ValueError(f"which ASTM F2656 does not have: its speeds are {known}")
     if penetration not in _ASTM_PENETRATION_M:
         known = ", ".join(_ASTM_PENETRATION_M)

@@ -128,7 +128,7 @@ class VehicleGround:
             *(area.rectangle_m for area in self.source.keep_outs),
             *self.gates,
             *_outside(
-                self.site.rectangle_m, tuple(each.rectangle_m for each in self.source.drivable)
+                self.site.rectangle_m, tuple(part.rectangle_m for part in self.source.drivable)
             ),
         )
 
@@ -241,7 +241,9 @@ class Drive:
         met: dict[RatedPiece, None] = {}
         for x_m, y_m in _along(way):
             around = Rectangle(x_m, y_m, x_m, y_m).grown(self.reach.width_m / 2.0)
-            met |= dict.fromkeys(each for each in self.broken if around.overlaps(each.rectangle))
+            met |= dict.fromkeys(
+                rated_piece for rated_piece in self.broken if around.overlaps(rated_piece.rectangle)
+            )
         hit = {impact.piece: impact for impact in self.impacts}
         return way, tuple(hit[piece] for piece in met if piece in hit)
 
@@ -275,7 +277,7 @@ class Drive:
         x, y = place.tolist()
         around = Rectangle(x, y, x, y).grown(radius_m)
         inside = self.ground.site.rectangle_m.contains(around)
-        return inside and not any(around.overlaps(each) for each in standing)
+        return inside and not any(around.overlaps(element) for element in standing)
 
 
 @lru_cache(maxsize=64)
@@ -286,9 +288,13 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     broken: tuple[RatedPiece, ...] = ()
     if motion is None:
         return Drive(ground, _reach(ground, obstacles, held, broken), held, broken)
-    broken = tuple(each for each in held if each.rating.mass_kg < motion.mass_kg)
-    held = tuple(each for each in held if each not in broken)
-    slow = tuple(each for each in held if each.rating.speed_km_h < motion.max_speed_km_h)
+    broken = tuple(
+        rated_piece for rated_piece in held if rated_piece.rating.mass_kg < motion.mass_kg
+    )
+    held = tuple(rated_piece for rated_piece in held if rated_piece not in broken)
+    slow = tuple(
+        rated_piece for rated_piece in held if rated_piece.rating.speed_km_h < motion.max_speed_km_h
+    )
     if slow:  # speeds are largest on the site without barriers, which is computed only once
         slow = _too_slow(slow, _free_speeds(ground))
     while True:
@@ -301,7 +307,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
         if not weak:
             return Drive(ground, reach, held, broken)
         broken = (*broken, *weak)
-        held, slow = (tuple(each for each in those if each not in weak) for those in (held, slow))
+        held, slow = (tuple(item for item in those if item not in weak) for those in (held, slow))
 
 
 def _too_slow(
@@ -315,9 +321,9 @@ def _too_slow(
         among: Places from which it may hit them (rows, columns); the open ones unless given.
     """
     return tuple(
-        each
-        for each in pieces
-        if (speeds.impact_km_h(each.rectangle, among) or 0.0) > each.rating.speed_km_h
+        piece
+        for piece in pieces
+        if (speeds.impact_km_h(piece.rectangle, among) or 0.0) > piece.rating.speed_km_h
     )
 
 
@@ -342,8 +348,12 @@ def _reach(
         site,
         source.width_m,
         tuple(entry.strip_m(site, side, source.width_m) for entry, side in ground.entries),
-        (*ground.always_closed_m, *obstacles.stops, *(each.rectangle for each in held)),
-        (*obstacles.solid, *(each.rectangle for each in broken)),
+        (
+            *ground.always_closed_m,
+            *obstacles.stops,
+            *(rated_piece.rectangle for rated_piece in held),
+        ),
+        (*obstacles.solid, *(rated_piece.rectangle for rated_piece in broken)),
         ground.standing_m,
     ).answer()
 
@@ -423,8 +433,8 @@ def _outside(site: Rectangle, inside: tuple[Rectangle, ...]) -> tuple[Rectangle,
     """Return rectangles that cover the site outside some others; none if there are no others."""
     if not inside:
         return ()
-    xs = np.unique([site.left, site.right, *(x for each in inside for x in each[0::2])])
-    ys = np.unique([site.bottom, site.top, *(y for each in inside for y in each[1::2])])
+    xs = np.unique([site.left, site.right, *(x for rectangle in inside for x in rectangle[0::2])])
+    ys = np.unique([site.bottom, site.top, *(y for rectangle in inside for y in rectangle[1::2])])
     outside = np.ones((len(ys) - 1, len(xs) - 1), dtype=bool)
     for left, bottom, right, top in inside:
         first_x, first_y = (

@@ -153,7 +153,7 @@ class SpeedField:
 
     def way_to(self, place_m: PointM) -> tuple["WayPoint", ...]:
         """Return a way to a place with the largest speed there; empty if there is none."""
-        x, y = (round(each / STEP_M) for each in place_m)
+        x, y = (round(coordinate_m / STEP_M) for coordinate_m in place_m)
         _, rows, columns = self.run_up_m.shape
         near = self.run_up_m[:, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
         number, up, right = np.unravel_index(int(near.argmax()), near.shape)
@@ -298,7 +298,7 @@ def _around(places: BoolArray) -> tuple[slice, slice]:
     if not places.any():
         return slice(None), slice(None)
     found = (np.flatnonzero(places.any(axis=axis)) for axis in (1, 0))
-    rows, columns = (slice(int(each[0]), int(each[-1]) + 1) for each in found)
+    rows, columns = (slice(int(item[0]), int(item[-1]) + 1) for item in found)
     return rows, columns
 
 

@@ -80,7 +80,7 @@ class Arcs(NamedTuple):
 
     def _only(self, kept: BoolArray) -> "Arcs":
         points = [self.points[self.first[arc] : self.first[arc + 1]] for arc in kept.nonzero()[0]]
-        first = np.concatenate(([0], np.cumsum([len(each) for each in points])))
+        first = np.concatenate(([0], np.cumsum([len(point) for point in points])))
         return Arcs(
             self.of[kept],
             first.astype(np.int32),
@@ -144,7 +144,7 @@ def _between(
     lengths = hypot(*one), hypot(*other)
     cosine = float(one @ other) / (lengths[0] * lengths[1])
     per_tangent = 1.0 / tan(acos(cosine) / 2.0)
-    tangents = {each * length for each in range(1, 200) for length in lengths}
+    tangents = {index * length for index in range(1, 200) for length in lengths}
     last = 0.0
     for tangent in sorted(tangents):
         radius = tangent * per_tangent

@@ -97,8 +97,8 @@ def references(
             _write(known, out)
         better = with_judged(known, submissions.values(), store)
         _write(better, out)
-        for path, each in submissions.items():
-            rescaled(each, better).save(path)
+        for path, submission in submissions.items():
+            rescaled(submission, better).save(path)
         for name in DEFINITIONS:
             if better[name] != known[name]:
                 print_line(f"{name}: best known by {better[name].best.method}")
@@ -128,21 +128,21 @@ def headroom(
         cells: tuple[str, ...] = (_CELL, _FINE)
         if candidate:
             store = BlastStore(cache)
-            asked = {each.name: each for each in map(named_definition, candidate)}
+            asked = {entry.name: entry for entry in map(named_definition, candidate)}
 
             def searched(definition: Definition, _: int) -> BenchmarkProblem:
                 return make(definition, blasts, 0.5, cache=store)
 
             known, cells = references_of(asked, (), 0.5, store, searched), (_CELL,)
     rows = []
-    for name, each in known.items():
-        row = [f"`{name}`", each.rule.method]
+    for name, item in known.items():
+        row = [f"`{name}`", item.rule.method]
         for cell in cells:
-            rule, best = (100.0 * (1.0 - end.shares[cell]) for end in (each.rule, each.best))
+            rule, best = (100.0 * (1.0 - end.shares[cell]) for end in (item.rule, item.best))
             row += [f"{rule:.1f}", f"{best:.1f}", f"{best - rule:.1f}"]
         rows.append(row)
     of_cell = "takes off ({} m, %)", "best known", "points more"
-    headers = "problem", "best rule", *(each.format(cell) for cell in cells for each in of_cell)
+    headers = "problem", "best rule", *(name.format(cell) for cell in cells for name in of_cell)
     print_line(markdown_table(headers, rows))
 
 
@@ -153,7 +153,11 @@ def picture(
 ) -> None:
     """Draw the points beside the best rule over the blasts spent, as the searches see them."""
     with user_errors():
-        methods = [each for each in shipped_standings() if set(each.problems) == set(DEFINITIONS)]
+        methods = [
+            shipped_standing
+            for shipped_standing in shipped_standings()
+            if set(shipped_standing.problems) == set(DEFINITIONS)
+        ]
         rules = {name: seen_rule(name, cache) for name in DEFINITIONS}
         figure = Figure(figsize=(8.0, 4.5), layout="constrained")
         axes = figure.add_subplot(
@@ -161,10 +165,10 @@ def picture(
         )
         budget, curves = BUDGETS[1], {}
         blasts = np.arange(budget + 1)
-        for each in methods:
-            runs = [run for run in each.runs if run.budget == budget]
-            curves[each.method] = mean_curve(runs, rules, blasts)
-        for index, name in enumerate(sorted(curves, key=lambda each: -curves[each][-1])):
+        for method in methods:
+            runs = [run for run in method.runs if run.budget == budget]
+            curves[method.method] = mean_curve(runs, rules, blasts)
+        for index, name in enumerate(sorted(curves, key=lambda curve: -curves[curve][-1])):
             line = "-" if index < 10 else "--"  # the colours repeat after ten
             axes.step(blasts, curves[name], where="post", label=name, linestyle=line)
         axes.axhline(0.0, color="black", linewidth=0.8)

@@ -75,7 +75,9 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int) -> Layout:
     sobol: Any = torch.quasirandom.SobolEngine(problem.space.keys, scramble=True, seed=seed)  # type: ignore[no-untyped-call]
     first = max(problem.most_blasts // 5, 4)
     places = sobol.draw(first, dtype=torch.float64)
-    values = torch.tensor([[_share(problem, each.numpy())] for each in places], dtype=torch.float64)
+    values = torch.tensor(
+        [[_share(problem, place.numpy())] for place in places], dtype=torch.float64
+    )
     side, won, lost = 0.8, 0, 0
     fitted: dict[str, Any] = {}
     while True:
@@ -238,7 +240,7 @@ def _draws(env: BlastBarrierEnv, predict: Predict, number: int) -> list[Guessed]
 
 def _ranked(draws: Sequence[Guessed]) -> list[Guessed]:
     """Return the proposal, then the draws, the best guess first."""
-    return [draws[0], *sorted(draws[1:], key=lambda each: -each[1])]
+    return [draws[0], *sorted(draws[1:], key=lambda draw: -draw[1])]
 
 
 def _best_of(problem: BenchmarkProblem, draws: Sequence[Guessed]) -> Layout:

@@ -105,10 +105,10 @@ def with_judged(
     found, engine = dict(known), find_engine(JUDGE, 0.5)
     for name, candidates in better.items():
         evaluator = BlastEvaluator(DEFINITIONS[name].scenario, engine, cache=cache)
-        for each in sorted(candidates, key=lambda each: each.shares[fine]):
-            (share,) = shares_of(DEFINITIONS[name].case, [each.layout], evaluator)
+        for candidate in sorted(candidates, key=lambda candidate: candidate.shares[fine]):
+            (share,) = shares_of(DEFINITIONS[name].case, [candidate.layout], evaluator)
             if share < known[name].rule.shares[coarse]:
-                best = replace(each, shares={coarse: share, **each.shares})
+                best = replace(candidate, shares={coarse: share, **candidate.shares})
                 found[name] = replace(known[name], best=best)
                 break
     return found
@@ -124,7 +124,9 @@ def rescaled(judged: JudgedSubmission, known: Mapping[str, ScoreReference]) -> J
 def published_blasts(definitions: Mapping[str, Definition]) -> BlastStore:
     """Return the published blasts of these problems."""
     store = BlastStore(size=_MOST)
-    sites = {each.scenario.content_hash: each.scenario for each in definitions.values()}
+    sites = {
+        definition.scenario.content_hash: definition.scenario for definition in definitions.values()
+    }
     remember_published(store, sites.values())
     return store
 
@@ -156,12 +158,12 @@ def with_fine_shares(
         for name in close
     ]
     found = [*rules, known.best]
-    shares = shares_of(definition.case, [each.layout for each in found], evaluator)
+    shares = shares_of(definition.case, [rule.layout for rule in found], evaluator)
     *rules, best = (
-        replace(each, shares={**each.shares, fine: share})
-        for each, share in zip(found, shares, strict=True)
+        replace(rule, shares={**rule.shares, fine: share})
+        for rule, share in zip(found, shares, strict=True)
     )
-    return replace(known, rule=min(rules, key=lambda each: each.shares[fine]), best=best)
+    return replace(known, rule=min(rules, key=lambda rule: rule.shares[fine]), best=best)
 
 
 def seen_rule(name: str, cache: Path | None) -> float:

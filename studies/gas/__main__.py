@@ -117,13 +117,14 @@ def endings(
             )
             found = run_all(run, list(jobs.values()), processes, progress)
     headers = ("site", "layout", "end (ms)", "CPU (s)", "largest share missed of a wall")
-    rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]
+    rows = [(*job, *_ending_row(result)) for job, result in zip(jobs, found, strict=True)]
     print_line(markdown_table((*headers, "of all protected", "level", "later"), rows))
-    limited = sum(each.reason is not EndReason.LOADS_KNOWN for each in found)
+    limited = sum(result.reason is not EndReason.LOADS_KNOWN for result in found)
+    differing = sum(len(set(result.levels)) > 1 for result in found)
     print_line(
-        f"{len(found)} blasts: at most {max(100.0 * each.missed for each in found):.2f} % of a wall"
-        f" and {max(100.0 * each.missed_of_all for each in found):.2f} % of a site; {limited}"
-        f" ended by the limit; {sum(len(set(each.levels)) > 1 for each in found)} levels differ"
+        f"{len(found)} blasts: at most {max(100.0 * result.missed for result in found):.2f} % of a"
+        f" wall and {max(100.0 * result.missed_of_all for result in found):.2f} % of a site;"
+        f" {limited} ended by the limit; {differing} levels differ"
     )
 
 
@@ -152,7 +153,7 @@ def definition(
     """
     rows: list[tuple[str, ...]] = []
     with user_errors():
-        cases = [each for each in LONG_RUNS if not scenario or each.name in scenario]
+        cases = [long_run for long_run in LONG_RUNS if not scenario or long_run.name in scenario]
         with progress_bar("blasts") as progress:
             for number, case in enumerate(cases, start=1):
                 rows += _definition_rows(case, case.until_s if until is None else until)
@@ -186,7 +187,7 @@ def _definition_rows(case: LongRun, until_s: float) -> Iterator[tuple[str, ...]]
         else:
             continue
         times_s = (found.reached_s, found.last_s, found.end_s)
-        times = (f"{MS_PER_S * each:,.0f}" for each in times_s)
+        times = (f"{MS_PER_S * time_s:,.0f}" for time_s in times_s)
         yield case.name, case.cells, name, positive, peak, *times
 
 
@@ -272,14 +273,14 @@ def _print_cells(
     x_m, y_m = charge.position_m
     print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
     rows = [
-        ("no barrier (Pa s)", *(f"{each.unprotected_pa_s:.1f}" for each in found)),
+        ("no barrier (Pa s)", *(f"{result.unprotected_pa_s:.1f}" for result in found)),
         *(
-            (name, *(_reduction(each.reduction.tolist(), number) for each in found))
+            (name, *(_reduction(result.reduction.tolist(), number) for result in found))
             for number, name in enumerate(layouts)
         ),
-        ("CPU time of a blast (s)", *(f"{each.cpu_s:.1f}" for each in found)),
+        ("CPU time of a blast (s)", *(f"{result.cpu_s:.1f}" for result in found)),
     ]
-    print_line(markdown_table(("", *(each.cells for each in found)), rows) + "\n")
+    print_line(markdown_table(("", *(result.cells for result in found)), rows) + "\n")
     rows = []
     for coarse, fine in combinations(found, 2):
         apart = difference(coarse, fine)
@@ -353,7 +354,7 @@ def judge(
         with progress_bar(f"gas blasts in {chosen.name}") as progress:
             found = judgement(chosen, layouts, drawn, seeds, processes, progress)
     headers = ("preset", "mean (gas)", "overstated", "rank correlation", "regret")
-    rows = [(preset, *_judgement_row(each)) for preset, each in found.items()]
+    rows = [(preset, *_judgement_row(item)) for preset, item in found.items()]
     print_line(markdown_table(headers, rows))
 
 

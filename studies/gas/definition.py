@@ -101,7 +101,9 @@ def both_loads(
     long = GasBlast(scenario, layout, engine=replace(engine, until=until_s))
     result: GasResult = long.run(recorders=recorders)
     run = result.run
-    names = {each.name: each.faces for each in run.site.structures if each.protected}
+    names = {
+        structure.name: structure.faces for structure in run.site.structures if structure.protected
+    }
     counts = np.array(
         [
             name in names and face in names[name]

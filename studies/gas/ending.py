@@ -91,7 +91,9 @@ class _Loads:
     @classmethod
     def of(cls, result: GasResult) -> "_Loads":
         walls = result.walls
-        protected = {each.name for each in result.blast.scenario.structures if each.protected}
+        protected = {
+            structure.name for structure in result.blast.scenario.structures if structure.protected
+        }
         chosen = walls[walls["counts"] & walls["structure"].isin(protected)]
         bays = result.bay_loads
         level = None
@@ -110,7 +112,7 @@ def sites(generated: int) -> Iterator[tuple[str, Scenario, GasEngine]]:
     for family, ranges in FAMILIES.items():
         found |= {f"{family}/{seed}": generate_site(seed, ranges) for seed in range(generated)}
     for title, site in found.items():
-        if any(each.protected for each in site.structures):
+        if any(structure.protected for structure in site.structures):
             large = max(site.site.width_m, site.site.height_m) > _LARGE_M
             yield title, site, GasEngine(cells="coarse" if large else "uniform")
 

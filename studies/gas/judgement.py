@@ -122,6 +122,6 @@ def _impulses(
         for seed in seeds
     ]
     loads = evaluator.loads_of_many(pairs, processes, progress)
-    values = np.array([each.protected_impulse_pa_s for each in loads])
+    values = np.array([load.protected_impulse_pa_s for load in loads])
     means: FloatArray = values.reshape(1 + len(layouts), len(charges), len(seeds)).mean(axis=2)
     return means

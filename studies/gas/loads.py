@@ -12,7 +12,7 @@ from blast_env.site import Scenario
 def protected_impulse_pa_s(result: GasResult) -> float:
     """Return the weighted mean impulse on the protected buildings, Pa s."""
     loads = result.loads()
-    return loads.protected_impulse_pa_s / sum(each.weight for each in loads.protected)
+    return loads.protected_impulse_pa_s / sum(structure.weight for structure in loads.protected)
 
 
 def impulse_until(blast: GasBlast, until_s: float) -> float:

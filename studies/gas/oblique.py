@@ -106,7 +106,7 @@ def oblique_loads(
     impulse, peak = result.run.loads.impulse_pa_s, result.run.loads.peak_pa
     covered = result.on_walls[chosen]
     bays = result.bay_loads
-    names = [each.name for each in result.run.site.structures]
+    names = [structure.name for structure in result.run.site.structures]
     patch = bay_patches(result.run.table, names, bays.bays)
     own = [bool(chosen[patch == index].all()) for index in range(len(bays.bays))]
     history_pa = bays.history_pa[own]

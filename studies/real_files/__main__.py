@@ -42,7 +42,7 @@ def main(
         if not files:
             raise BlastEnvError(f"{folder}: has no map, drawing or model")
         found = {str(path.relative_to(folder)): survey(path) for path in files}
-        records = {name: record_of(each) for name, each in found.items()}
+        records = {name: record_of(item) for name, item in found.items()}
         if out is not None:
             save(records, out)
     _print(found)
@@ -57,19 +57,19 @@ def _print(found: dict[str, Survey]) -> None:
     """Print the outcome of each file, and the sums of all ledgers."""
     sums: Counter[tuple[Fate, str]] = Counter()
     refusals: Counter[str] = Counter()
-    for name, each in found.items():
-        sums += each.sums
-        if each.refusal:
-            refusals[shortened(each.refusal, _WORDS)] += 1
+    for name, item in found.items():
+        sums += item.sums
+        if item.refusal:
+            refusals[shortened(item.refusal, _WORDS)] += 1
         counts = Counter[Fate]()
-        for (fate, _), count in each.sums.items():
+        for (fate, _), count in item.sums.items():
             counts[fate] += count
         objects = sum(counts[fate] for fate in FATES)
         words = ", ".join(f"{fate} {count}" for fate, count in sorted(counts.items()))
-        outcome = each.refusal or f"{objects} objects: {words}"
+        outcome = item.refusal or f"{objects} objects: {words}"
         print_line(f"{name}: {shortened(outcome, 2 * _WORDS)}")
     print_line(f"imported {len(found) - refusals.total()} of {len(found)} files")
-    for (fate, kind), count in sorted(sums.items(), key=lambda each: (each[0][0], -each[1])):
+    for (fate, kind), count in sorted(sums.items(), key=lambda item: (item[0][0], -item[1])):
         print_line(f"{fate}: {kind}: {count}")
     for refusal, count in refusals.most_common():
         print_line(f"refused: {refusal}: {count}")

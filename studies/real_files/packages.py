@@ -39,7 +39,7 @@ class Package:
 def listed() -> tuple[Package, ...]:
     """Return the packages of `packages.toml`."""
     with _LIST.open("rb") as file:
-        return tuple(Package(**each) for each in tomllib.load(file)["package"])
+        return tuple(Package(**locked) for locked in tomllib.load(file)["package"])
 
 
 def fetch(package: Package, folder: Path) -> int:
@@ -85,9 +85,9 @@ def _members(archive: Path) -> Iterator[tuple[str, bytes]]:
     """Yield names and contents of the files of an archive that an import may read."""
     if archive.suffix in (".whl", ".zip"):
         with zipfile.ZipFile(archive) as packed:
-            for each in packed.infolist():
-                if _is_map(each.filename) and each.file_size <= _MOST_BYTES:
-                    yield each.filename, packed.read(each)
+            for item in packed.infolist():
+                if _is_map(item.filename) and item.file_size <= _MOST_BYTES:
+                    yield item.filename, packed.read(item)
     elif archive.name.endswith((".tar.gz", ".tgz")):
         with tarfile.open(archive) as bundle:
             for member in bundle:

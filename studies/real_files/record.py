@@ -49,10 +49,10 @@ def changes(before: Mapping[str, Record], after: Mapping[str, Record]) -> Iterat
             continue
         old, new = before[name], after[name]
         if old["refusal"] != new["refusal"]:
-            words = (shortened(each["refusal"], _WORDS) or "imported" for each in (old, new))
+            words = (shortened(value["refusal"], _WORDS) or "imported" for value in (old, new))
             yield f"{name}: {' -> '.join(words)}"
-        yield from (f"{name}: {each}" for each in _of_sums(old["sums"], new["sums"]))
-        yield from (f"{name}: {each}" for each in _of_solids(old["buildings"], new["buildings"]))
+        yield from (f"{name}: {item}" for item in _of_sums(old["sums"], new["sums"]))
+        yield from (f"{name}: {solid}" for solid in _of_solids(old["buildings"], new["buildings"]))
 
 
 def _of_sums(old: Mapping[str, int], new: Mapping[str, int]) -> Iterator[str]:
@@ -65,7 +65,7 @@ def _of_solids(
     old: Mapping[str, Sequence[float]], new: Mapping[str, Sequence[float]]
 ) -> Iterator[str]:
     for place in sorted(old.keys() | new.keys()):
-        words = [_solid(each.get(place)) for each in (old, new)]
+        words = [_solid(value.get(place)) for value in (old, new)]
         if words[0] != words[1]:
             yield f"{place}: {' -> '.join(words)}"
 

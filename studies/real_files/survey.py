@@ -63,11 +63,11 @@ def _surveyed(path: Path) -> Survey:
     """Import a file: its largest building is protected, on a site of 200 m in a large map."""
     site_map = _read(path)
     options = site_map.options
-    sound = [each for each in things_of(site_map) if not each.fault]
-    outlines = [each for each in sound if each.role is Role.BUILDING]
+    sound = [thing for thing in things_of(site_map) if not thing.fault]
+    outlines = [thing for thing in sound if thing.role is Role.BUILDING]
     if not outlines:
         import_site(path, options)  # says why
-    chief = max(outlines, key=lambda each: float(each.geometry.area))
+    chief = max(outlines, key=lambda outline: float(outline.geometry.area))
     options = _around(site_map, sound, chief, options)
     error = None
     for attempt in _attempts(site_map, chief, options, sound):
@@ -78,7 +78,7 @@ def _surveyed(path: Path) -> Survey:
             if "charge" not in str(refusal):
                 raise
         else:
-            kinds = ((each.fate, each.kind) for each in imported.ledger.entries)
+            kinds = ((entry.fate, entry.kind) for entry in imported.ledger.entries)
             return Survey(path, "", Counter(kinds), _solids(imported))
     assert error is not None
     raise error
@@ -87,10 +87,14 @@ def _surveyed(path: Path) -> Survey:
 def _solids(site: ImportedSite) -> dict[str, tuple[float, float, float]]:
     """Return area, underside and top of the buildings, the parts of one together."""
     found: dict[str, tuple[float, float, float]] = {}
-    for each in site.buildings:
-        area_m2, base_m, top_m = found.get(each.place, (0.0, each.base_m, 0.0))
-        area_m2 = round(area_m2 + each.outline.area, 1)
-        found[each.place] = area_m2, min(base_m, each.base_m), max(top_m, each.height_m or 0.0)
+    for building in site.buildings:
+        area_m2, base_m, top_m = found.get(building.place, (0.0, building.base_m, 0.0))
+        area_m2 = round(area_m2 + building.outline.area, 1)
+        found[building.place] = (
+            area_m2,
+            min(base_m, building.base_m),
+            max(top_m, building.height_m or 0.0),
+        )
     return found
 
 
@@ -118,7 +122,7 @@ def _around(
     point = chief.geometry.representative_point()
     middle = float(point.x), float(point.y)
     options = replace(options, protect_near=middle)
-    left, bottom, right, top = shapely.total_bounds([each.geometry for each in things])
+    left, bottom, right, top = shapely.total_bounds([thing.geometry for thing in things])
     if max(right - left, top - bottom) * _unit_m(site_map) > _LARGEST_M:
         return replace(options, centre=middle, size_m=_SIZE_M)
     return options
@@ -128,7 +132,7 @@ def _attempts(
     site_map: SiteMap, chief: Thing, options: ImportOptions, things: list[Thing]
 ) -> Iterator[ImportOptions]:
     """Yield the options, with a charge beside the building if the file has no place for one."""
-    if any(each.role is Role.CHARGE for each in things):
+    if any(thing.role is Role.CHARGE for thing in things):
         yield options
     left, bottom, right, top = chief.geometry.bounds
     for aside_m in _BESIDE_M:

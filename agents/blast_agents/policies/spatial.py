@@ -31,7 +31,7 @@ _OVERVIEW: Final = (
 
 def variant_channels(channels: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of the planes of legal places, one per variant of a catalogue, in order."""
-    return tuple(each for each in channels if each.endswith(":legal"))
+    return tuple(channel for channel in channels if channel.endswith(":legal"))
 
 
 class ZoneExtractor(BaseFeaturesExtractor):
@@ -73,7 +73,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.rows, self.columns, self.places, self.width = rows, columns, places, width
         self._known: tuple[Tensor, ZoneGeometry] | None = None
         values = (":height", ":cost", ":left")
-        self.items = tuple(each for each in self.channels if each.endswith(values))
+        self.items = tuple(channel for channel in self.channels if channel.endswith(values))
         variants = variant_channels(self.channels)
         self.around = ("barrier_height", "stops_vehicles", *variants) if variants else ()
         # Posts are useful where they cut off ground within a vehicle's reach.

@@ -250,8 +250,8 @@ class TrainedAgent:
             # Many layouts have the same beginning: the policy evaluates it once.
             different = {placements[index].layout: placements[index] for index in open_ones}
             number_of = {layout: number for number, layout in enumerate(different)}
-            observations = np.stack([episode.observe(each) for each in different.values()])
-            legal = np.stack([each.legal.ravel() for each in different.values()])
+            observations = np.stack([episode.observe(item) for item in different.values()])
+            legal = np.stack([item.legal.ravel() for item in different.values()])
             numbers = [number_of[placements[index].layout] for index in open_ones]
             with torch_threads(1):  # further threads only wait for these small products
                 actions = self._actions(observations, legal, numbers, draw)

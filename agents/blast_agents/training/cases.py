@@ -92,7 +92,7 @@ def training_cases(
         drawn.append((scenario, draw_threats(scenario, seeds)))
     if known_site and not hidden:
         shown = in_turn(drawn[0][0], [first for _, (first,) in drawn])
-        drawn = [(drawn[0][0], (each,)) for each in shown]
+        drawn = [(drawn[0][0], (load_case,)) for load_case in shown]
     cases: dict[object, LoadCaseSet] = {}
     for index, (scenario, of_case) in enumerate(drawn):
         case = LoadCaseSet(
@@ -112,7 +112,7 @@ def _cases(
     """Return one case with one threat per scenario and seed."""
     pairs = zip(scenarios, seeds, strict=True)
     threats = [draw_threats(scenario, [seed])[0] for scenario, seed in pairs]
-    if all(each is scenarios[0] for each in scenarios):
+    if all(scenario is scenarios[0] for scenario in scenarios):
         threats = [*in_turn(scenarios[0], threats)]
     cases = []
     for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):

@@ -116,7 +116,7 @@ class BatchVecEnv(VecEnv):
                 f"autoreset_mode is {envs.autoreset_mode.value!r}, must be 'Disabled'"
             )
         self.envs = envs
-        self._pools = [_Pool(each["size"], each.get("seed", 0)) for each in pools]
+        self._pools = [_Pool(pool["size"], pool.get("seed", 0)) for pool in pools]
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> VecEnvObs:
@@ -153,8 +153,8 @@ class BatchVecEnv(VecEnv):
         """Return the seeds of the next episodes of the environments, from their pools if any."""
         if not self._pools:
             return [*seeds]
-        each = zip(self._pools, seeds, chosen, strict=False)
-        return [pool.draw(seed) if begins else None for pool, seed, begins in each]
+        drawn = zip(self._pools, seeds, chosen, strict=False)
+        return [pool.draw(seed) if begins else None for pool, seed, begins in drawn]
 
     def close(self) -> None:
         """Close the environments."""
@@ -199,8 +199,8 @@ def _of_one(values: Any, index: int) -> Any:
         return values[index]
     everyone = {index: True}
     return {
-        key: _of_one(each, index)
-        for key, each in values.items()
+        key: _of_one(value, index)
+        for key, value in values.items()
         if not key.startswith("_") and values.get(f"_{key}", everyone)[index]
     }
 

@@ -136,10 +136,10 @@ def _training_curve(
     The blasts are interpolated between the evaluations, by the steps.
     """
     episodes = read_episodes(monitor)
-    steps = start + np.cumsum([each.l for each in episodes])
+    steps = start + np.cumsum([episode.l for episode in episodes])
     known = np.maximum.accumulate([0, *(row.timesteps for row in rows)])
     spent = np.interp(steps, known, [0, *(row.blasts for row in rows)])
-    reduction = np.array([each.reduction for each in episodes])
+    reduction = np.array([episode.reduction for episode in episodes])
     window = max(min(len(episodes) // 10, _WINDOW), 1)
     parts = [slice(first, first + window) for first in range(0, len(episodes), window)]
     return [spent[part].mean() for part in parts], [reduction[part].mean() for part in parts]

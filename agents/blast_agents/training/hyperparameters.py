@@ -69,7 +69,7 @@ def option_names(model: type[BaseModel]) -> list[str]:
     for name, field in model.model_fields.items():
         inner = field.annotation
         if isinstance(inner, type) and issubclass(inner, BaseModel):
-            names += [f"{name}.{each}" for each in inner.model_fields]
+            names += [f"{name}.{model_field}" for model_field in inner.model_fields]
         else:
             names.append(name)
     return names
@@ -237,7 +237,9 @@ class Hyperparameters(BaseModel):
     def wrappers(self) -> tuple[tuple[str, dict[str, Any]], ...]:
         """Return name and arguments of each wrapper, the innermost first."""
         return tuple(
-            (name, dict(arguments)) for each in self.env_wrapper for name, arguments in each.items()
+            (name, dict(arguments))
+            for wrapper in self.env_wrapper
+            for name, arguments in wrapper.items()
         )
 
 

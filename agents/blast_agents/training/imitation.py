@@ -192,7 +192,7 @@ def best_by_rule(
     tried = []
     for case in cases:
         by_rule = layouts_by_rule(case.scenario, case.charge).values()
-        tried.append([*dict.fromkeys([(), *(tuple(sorted(each)) for each in by_rule)])])
+        tried.append([*dict.fromkeys([(), *(tuple(sorted(layout)) for layout in by_rule)])])
     blasts = [
         (evaluators.of(case.scenario), layout, threat)
         for case, layouts in zip(cases, tried, strict=True)
@@ -202,7 +202,7 @@ def best_by_rule(
     loads, found = iter(loads_together(blasts, processes)), []
     for case, layouts in zip(cases, tried, strict=True):
         own = islice(loads, len(layouts) * len(case.threats))
-        of_layouts = np.array([each.load(case.scenario.objective) for each in own])
+        of_layouts = np.array([load.load(case.scenario.objective) for load in own])
         values = [
             case.objective_value(of_layout, layout)
             for of_layout, layout in zip(of_layouts.reshape(len(layouts), -1), layouts, strict=True)

@@ -285,7 +285,7 @@ class RunFolder:
     def _numbered(self, pattern: re.Pattern[str]) -> dict[int, Path]:
         found = [match for match in map(pattern.fullmatch, self._names) if match]
         return {
-            int(each[1]): self.path / each[0] for each in sorted(found, key=lambda m: int(m[1]))
+            int(match[1]): self.path / match[0] for match in sorted(found, key=lambda m: int(m[1]))
         }
 
     @property

@@ -79,9 +79,9 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
     keys = [*_BLAST, "structure"]
     unprotected = rows.loc[rows["layout"] == "[]", [*keys, *_LOADS]].drop_duplicates(keys)
     rows = rows.merge(
-        unprotected.rename(columns={each: f"unprotected_{each}" for each in _LOADS}), "left", keys
+        unprotected.rename(columns={load: f"unprotected_{load}" for load in _LOADS}), "left", keys
     )
-    splits = {each: split_of(each) for each in rows["scenario_hash"].unique()}
+    splits = {value: split_of(value) for value in rows["scenario_hash"].unique()}
     rows["split"] = rows["scenario_hash"].map(splits)
     return rows[[column.name for column in COLUMNS]]
 
@@ -99,7 +99,7 @@ def sources() -> tuple[Path, ...]:
     package = Path(__file__).resolve().parent
     installed = package / "tables"
     folder = installed if installed.is_dir() else package.parents[2] / "docs" / "data"
-    return tuple(folder / f"{each}.parquet" for each in TABLES)
+    return tuple(folder / f"{table}.parquet" for table in TABLES)
 
 
 def as_tensors(rows: "pd.DataFrame") -> tuple[Any, Any]:

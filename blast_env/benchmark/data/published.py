@@ -40,13 +40,13 @@ def remember_published(store: BlastStore, scenarios: Iterable[Scenario]) -> int:
         for *blast, structure, impulse_pa_s, peak_pa in zip(*columns, strict=True):
             found[tuple(blast)][structure] = impulse_pa_s, peak_pa
         for (text, x_m, y_m, tnt_kg, height_m), known in found.items():
-            layout = [catalogue.element_from(tuple(each), "layout") for each in json.loads(text)]
+            layout = [catalogue.element_from(tuple(load), "layout") for load in json.loads(text)]
             threat = LoadCase(Charge((x_m, y_m), tnt_kg, height_m), 0)
             loads = tuple(
-                StructureLoad.on(each, *known[each.name], in_range=True)
-                for each in scenario.structures
+                StructureLoad.on(structure, *known[structure.name], in_range=True)
+                for structure in scenario.structures
             )
-            modules = np.zeros(sum(each.modules for each in scenario.structures))
+            modules = np.zeros(sum(structure.modules for structure in scenario.structures))
             store.remember(evaluator.key(layout, threat), BlastLoads(loads, modules))
         count += len(found)
     return count

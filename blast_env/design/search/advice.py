@@ -121,7 +121,7 @@ def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
     zone = scenario.zone
     names = _items_of(scenario, kind)
     items = tuple(
-        each if each.name in names else each.model_copy(update={"stock": 0}) for each in zone.items
+        item if item.name in names else item.model_copy(update={"stock": 0}) for item in zone.items
     )
     hardening = zone.hardening if kind in (MeasureKind.HARDEN, MeasureKind.TOGETHER) else ()
     removable = zone.removable if kind in (MeasureKind.SHIELD, MeasureKind.TOGETHER) else ()
@@ -132,11 +132,11 @@ def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
 
 def _items_of(scenario: Scenario, kind: MeasureKind) -> set[str]:
     low = {
-        each.name
-        for each in scenario.zone.items
-        if each.stops_vehicles and each.height_m < _LOW_M and scenario.vehicles
+        item.name
+        for item in scenario.zone.items
+        if item.stops_vehicles and item.height_m < _LOW_M and scenario.vehicles
     }
-    every = {each.name for each in scenario.zone.items if each.stock > 0}
+    every = {item.name for item in scenario.zone.items if item.stock > 0}
     return {
         MeasureKind.NOTHING: set[str](),
         MeasureKind.KEEP_AWAY: every & low,
@@ -196,7 +196,7 @@ def advise(
             for layout in ruled.values():
                 yield layout[: len(layout) // 2]
             while True:
-                ranked = sorted(best, key=lambda each: best[each])[:_KEPT]
+                ranked = sorted(best, key=lambda item: best[item])[:_KEPT]
                 chosen = ranked[int(rng.integers(len(ranked)))]
                 yield load_relevant(_changed(moves, chosen, rng))
 
@@ -260,14 +260,14 @@ def advise_until(
         begin_with = (*begin_with, found.layout)
     return replace(
         best_of(every, judge),
-        blasts=sum(each.blasts for each in every),
-        tried=tuple(tried for each in every for tried in each.tried),
+        blasts=sum(thing.blasts for thing in every),
+        tried=tuple(tried for thing in every for tried in thing.tried),
     )
 
 
 def best_of(found: Iterable[Advice], judge: Callable[[Layout], Verdict]) -> Advice:
     """Return the result with the best verdict; among equals the cheapest or nearest to passing."""
-    return min(found, key=lambda each: (-judge(each.layout), each.best))
+    return min(found, key=lambda advice: (-judge(advice.layout), advice.best))
 
 
 def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
@@ -283,7 +283,7 @@ def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator
     poorer = scenario.model_copy(update={"build_zone": share})
     ruled = [layouts_by_rule(poorer, charge) for charge in distinct]
     for name in ruled[0]:
-        yield tuple(element for each in ruled for element in each.get(name, ()))
+        yield tuple(element for layout in ruled for element in layout.get(name, ()))
 
 
 def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
@@ -303,11 +303,11 @@ def _hardened(
     Raises:
         BudgetError: If the blasts exceed the budget of the problem.
     """
-    names = [each.name for each in scenario.zone.hardening]
+    names = [measure.name for measure in scenario.zone.hardening]
     counts = range(len(names) + 1) if len(names) <= _MOST_LOOKED_AT else (0, 1, len(names))
     placement = LayoutState(scenario, barrier)
     left = placement.budget_left
-    prices = {each.name: each.cost for each in scenario.zone.hardening}
+    prices = {measure.name: measure.cost for measure in scenario.zone.hardening}
     found: list[AssessedLayout] = []
     for count in counts:
         for taken in combinations(names, count):
@@ -324,4 +324,4 @@ def _hardened(
 def _worst_damage(problem: DesignProblem, layout: Layout) -> float:
     """Return the worst damage over all threats, from the blasts that were run before."""
     loads = problem.evaluator.loads_of_many((layout, threat) for threat in problem.threats)
-    return worst(each.worst_damage or 0.0 for load in loads for each in load.protected)
+    return worst(structure.worst_damage or 0.0 for load in loads for structure in load.protected)

@@ -122,7 +122,7 @@ class AdviceJudge:
         return GridError.of(campaign.run(worst=lambda _: number))
 
     def _campaign(self, *layouts: Layout) -> Campaign:
-        named = {str(number): each for number, each in enumerate(layouts)}
+        named = {str(number): layout for number, layout in enumerate(layouts)}
         return Campaign(self.problem.case, named, self.evaluator)
 
 
@@ -163,7 +163,7 @@ def advised(
     kinds, found = kinds_for(judge.scenario), list[Advice]()
     margin = MARGIN if judge.scenario.objective.target_probability is None else _PROBABLE_MARGIN
     for number, kind in enumerate(kinds):
-        first = tuple(each.layout for each in found) if kind is MeasureKind.TOGETHER else ()
+        first = tuple(advice.layout for advice in found) if kind is MeasureKind.TOGETHER else ()
         part = share_of(progress, number, len(kinds))
         found.append(
             advise_until(

@@ -114,7 +114,7 @@ class Nsga2Search(Search):
         size = 2 * population_size(session.plan.exploring_layouts)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
-            prices = [problem.price(each) for each in layouts]
+            prices = [problem.price(layout) for layout in layouts]
             return np.column_stack([session.assess(layouts), prices])
 
         drawn = [self.draw(problem.scenario, session.rng) for _ in range(size)]

@@ -59,17 +59,17 @@ def search_figure(result: SearchResult, problem: DesignProblem) -> Figure:
 def _draw_history(axes: Axes, result: SearchResult, problem: DesignProblem) -> None:
     """Draw the best reduction over the blasts spent, in a colour for each number of threats."""
     history = result.history
-    ends = [*(each.blasts for each in history[1:]), max(result.blasts, history[-1].blasts)]
-    counts = sorted({each.threats for each in history})
+    ends = [*(step.blasts for step in history[1:]), max(result.blasts, history[-1].blasts)]
+    counts = sorted({step.threats for step in history})
     # The strongest colour last, for the largest number of threats.
     colours = _COLOURS[-len(counts) :] if len(counts) <= len(_COLOURS) else (_BEST,) * len(counts)
     for count, colour in zip(counts, colours, strict=True):
-        chosen = [(each, end) for each, end in zip(history, ends, strict=True)]
-        chosen = [(each, end) for each, end in chosen if each.threats == count]
-        blasts = np.array([(each.blasts, end) for each, end in chosen]).ravel()
-        reduction = np.repeat([each.reduction(problem) for each, _ in chosen], 2)
+        chosen = [(step, end) for step, end in zip(history, ends, strict=True)]
+        chosen = [(item, end) for item, end in chosen if item.threats == count]
+        blasts = np.array([(item.blasts, end) for item, end in chosen]).ravel()
+        reduction = np.repeat([item.reduction(problem) for item, _ in chosen], 2)
         axes.plot(blasts, reduction, color=colour, linewidth=2.2, zorder=3)
-        starts = [each.blasts for each, _ in chosen]
+        starts = [item.blasts for item, _ in chosen]
         axes.plot(
             starts,
             reduction[::2],
@@ -92,8 +92,8 @@ def _draw_history(axes: Axes, result: SearchResult, problem: DesignProblem) -> N
 
 def _draw_front(axes: Axes, front: Sequence[Candidate], problem: DesignProblem) -> None:
     """Draw the reduction over the number of modules or, with a catalogue, over the cost."""
-    prices = [problem.price(each.layout) for each in front]
-    reduction = [each.reduction(problem) for each in front]
+    prices = [problem.price(candidate.layout) for candidate in front]
+    reduction = [candidate.reduction(problem) for candidate in front]
     axes.step(prices, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)
     axes.plot(prices, reduction, "o", color=_BEST, markersize=6.0, zorder=3)
     has_items = bool(problem.scenario.zone.items)

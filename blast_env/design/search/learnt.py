@@ -71,12 +71,12 @@ class Guesses:
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
         """Return the predicted value of the objective for each layout (layouts,)."""
-        new = [each for each in dict.fromkeys(layouts) if each not in self._known]
+        new = [layout for layout in dict.fromkeys(layouts) if layout not in self._known]
         if new:
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
             for layout, loads in zip(new, np.transpose(by_threat), strict=True):
                 self._known[layout] = self.case.objective_value(loads, layout)
-        return np.array([self._known[each] for each in layouts])
+        return np.array([self._known[layout] for layout in layouts])
 
     @property
     def count(self) -> int:
@@ -88,7 +88,7 @@ class Guesses:
         return sorted(self._known, key=lambda layout: self._known[layout])
 
     def _weighted(self, layouts: Sequence[Layout], threat: LoadCase) -> FloatArray:
-        charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
+        charges = [threat.charge_against(self.case.scenario, layout) for layout in layouts]
         return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
 
 
@@ -110,7 +110,7 @@ def improved(
         rng: Draws the changes.
         tell: Called with the share that is done.
     """
-    guesses.loads([tuple(sorted(each)) for each in begin_with])
+    guesses.loads([tuple(sorted(layout)) for layout in begin_with])
     moves, end = Moves(guesses.case.scenario), guesses.count + most
     tries = 0
     while guesses.count < end and tries < 4 * most:
@@ -224,7 +224,7 @@ class LearntSearch(Search):
             return improved(guesses, begin_with, self.changes, generator(0), go_on)[0]
         proposed = self.agent.propose(scenario, charge)
         drawn = self.agent.sample(scenario, charge, self.ranked, 0)
-        guesses.loads([tuple(sorted(each)) for each in (proposed, *drawn)])
+        guesses.loads([tuple(sorted(draw)) for draw in (proposed, *drawn)])
         return guesses.ranked()[0]
 
     def plan(self, problem: DesignProblem, budget: int) -> Plan:
@@ -283,7 +283,7 @@ class LearntSearch(Search):
         tried = {*proposed[:1]}
 
         def try_best(candidates: Sequence[Layout]) -> None:
-            new = [each for each in dict.fromkeys(candidates) if each not in tried]
+            new = [candidate for candidate in dict.fromkeys(candidates) if candidate not in tried]
             chosen = estimates.likeliest(new or candidates)
             tried.add(chosen)
             session.assess([chosen])
@@ -383,8 +383,8 @@ class _Estimates:
         met = self.session.ranked(self.session.plan.threats)[:_LEARNT_FROM]
         if met:
             barrier = self.everywhere.site.barrier
-            correction = Correction.of([barrier(each) for each in met], self._errors(met))
-            mean, spread = correction.expected([barrier(each) for each in layouts])
+            correction = Correction.of([barrier(item) for item in met], self._errors(met))
+            mean, spread = correction.expected([barrier(layout) for layout in layouts])
             scores += mean - _HOPE * spread
         return layouts[int(scores.argmin())]
 

@@ -192,8 +192,8 @@ class Moves:
         if rng.random() < 0.3:
             wall = set(layout)
         up, right = np.rint(rng.normal(0.0, self.reach_cells, 2)).astype(int).tolist()
-        moved = [_shifted(each, up, right) for each in layout if each in wall]
-        stay = [each for each in layout if each not in wall]
+        moved = [_shifted(element, up, right) for element in layout if element in wall]
+        stay = [element for element in layout if element not in wall]
         placement = legal_part(self.scenario, [*stay, *moved])
         # Elements that cannot be displaced are placed near those that can.
         while len(placement.layout) < len(layout) and not placement.is_full:
@@ -243,9 +243,9 @@ class Moves:
         found, todo, left = {start}, [start], set(layout) - {start}
         while todo and left:
             others = sorted(left)
-            places = [(catalogue.variant_number(each), *each[:2]) for each in others]
+            places = [(catalogue.variant_number(other), *other[:2]) for other in others]
             gaps = _gaps(catalogue, np.array(places).T, todo.pop())
-            near = {each for each, gap in zip(others, np.hypot(*gaps), strict=True) if gap < 1.5}
+            near = {other for other, gap in zip(others, np.hypot(*gaps), strict=True) if gap < 1.5}
             left -= near
             found |= near
             todo += sorted(near)
@@ -259,7 +259,7 @@ def _of_one_item(
 
     It is the item of `like`, or a random one if that has no legal place or `like` is `None`.
     """
-    items = np.array([each.item for each in placement.catalogue.variants])
+    items = np.array([variant.item for variant in placement.catalogue.variants])
     possible = np.unique(items[placement.legal.any(axis=(1, 2))]).tolist()
     wanted = None if like is None else placement.catalogue.variant(like).item
     item = wanted if wanted in possible else possible[int(rng.integers(len(possible)))]
@@ -275,7 +275,7 @@ def _gaps(
     Places are the numbers of the variants, and the rows and columns of their lower left cells.
     """
     numbers, rows, columns = places
-    sizes = np.array([(each.rows, each.columns) for each in catalogue.variants])[numbers]
+    sizes = np.array([(variant.rows, variant.columns) for variant in catalogue.variants])[numbers]
     own = catalogue.variant(beside)
     up = np.maximum(rows - beside[0] - (own.rows - 1), beside[0] - rows - (sizes[:, 0] - 1))
     right = np.maximum(

@@ -69,7 +69,7 @@ class SpatialCrossover(Crossover):
         rng: np.random.Generator = options["random_state"]
         children = np.empty_like(actions)
         for pair in range(actions.shape[1]):
-            parents = [layout_of(self._scenario, actions[each, pair]) for each in (0, 1)]
+            parents = [layout_of(self._scenario, actions[value, pair]) for value in (0, 1)]
             cross = mixed if rng.random() < _MIXED_SHARE else cut
             for child, (first, second) in enumerate((parents, parents[::-1])):
                 layout = cross(first, second, rng)
@@ -111,7 +111,7 @@ class MoveMutation(Mutation):
     def _do(self, _problem: Any, actions: BoolArray, *_: Any, **options: Any) -> BoolArray:
         rng: np.random.Generator = options["random_state"]
         scenario = self._moves.scenario
-        return np.array([individual(scenario, self._changed(each, rng)) for each in actions])
+        return np.array([individual(scenario, self._changed(action, rng)) for action in actions])
 
     def _changed(self, actions: BoolArray, rng: np.random.Generator) -> Layout:
         scenario = self._moves.scenario
@@ -136,7 +136,7 @@ class LayoutRepair(Repair):
     def _do(self, _problem: Any, actions: BoolArray, *_: Any, **options: Any) -> BoolArray:
         rng: np.random.Generator = options["random_state"]
         scenario = self._scenario
-        layouts = (repaired(scenario, layout_of(scenario, each), rng) for each in actions)
+        layouts = (repaired(scenario, layout_of(scenario, action), rng) for action in actions)
         return np.array([individual(scenario, layout) for layout in layouts])
 
 
@@ -194,6 +194,6 @@ def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> No
         population = algorithm.ask()
         if population is None or not len(population):
             return
-        layouts = [layout_of(scenario, each) for each in population.get("X")]
+        layouts = [layout_of(scenario, individual) for individual in population.get("X")]
         population.set("F", objectives(layouts))
         algorithm.tell(infills=population)

@@ -74,10 +74,12 @@ class PackageProposer:
 def _remedy(problem: DesignProblem) -> str:
     """Return the stand-off that would halve the largest impulse, and the way to other help."""
     walls = problem.scenario.loaded_walls
-    charges = [each.charge_against(problem.scenario, ()) for each in problem.threats]
-    scale = {each: float(np.cbrt(each.tnt_kg)) for each in charges}
-    now_m = {each: max(stand_off_m(walls, each.position_m), scale[each]) for each in charges}
-    worst = min(charges, key=lambda each: now_m[each] / scale[each])
+    charges = [threat.charge_against(problem.scenario, ()) for threat in problem.threats]
+    scale = {charge: float(np.cbrt(charge.tnt_kg)) for charge in charges}
+    now_m = {
+        charge: max(stand_off_m(walls, charge.position_m), scale[charge]) for charge in charges
+    }
+    worst = min(charges, key=lambda charge: now_m[charge] / scale[charge])
     further = np.linspace(1.0, 4.0, 301)
     with suppress(BlastEnvError):  # beyond the range of the curves
         impulse = kingery_bulmash("reflected_impulse", now_m[worst] * further, worst.tnt_kg)
@@ -111,22 +113,22 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
         rules: The layouts of the rules.
     """
 
-    def load(each: Layout) -> float:
-        return guesses.loads([each]).item()
+    def load(layout: Layout) -> float:
+        return guesses.loads([layout]).item()
 
-    unprotected, ruled = load(()), [tuple(sorted(each)) for each in rules]
+    unprotected, ruled = load(()), [tuple(sorted(rule)) for rule in rules]
     best = min([layout, *ruled], key=load)
     most = min(map(load, ruled), default=unprotected)
     if load(best) <= (1.0 - LEAST_GAIN) * unprotected:
         most = min(most, (1.0 - LEAST_GAIN) * unprotected)
 
     def without(piece: Element) -> Layout:
-        return tuple(each for each in best if each != piece)
+        return tuple(feature for feature in best if feature != piece)
 
     # Removed walls stay removed, because pieces may stand in their place.
-    pieces = [each for each in best if not isinstance(each, Removal)]
+    pieces = [feature for feature in best if not isinstance(feature, Removal)]
     guesses.loads([without(piece) for piece in pieces])  # all at once
-    for piece in sorted(pieces, key=lambda each: load(without(each))):
+    for piece in sorted(pieces, key=lambda piece: load(without(piece))):
         fewer = without(piece)
         if load(fewer) <= min(load(best) + LEAST_PIECE_GAIN * unprotected, most):
             best = fewer

@@ -111,7 +111,7 @@ class SearchResult:
         A search plans for its whole budget. Its best layout after part of the budget is worse than
         that of a search with the smaller budget.
         """
-        by_then = [each for each in self.history if each.blasts <= blasts]
+        by_then = [step for step in self.history if step.blasts <= blasts]
         return by_then[-1] if by_then else None
 
     def history_table(self) -> "pd.DataFrame":
@@ -129,10 +129,16 @@ def _table(candidates: tuple[Candidate, ...]) -> "pd.DataFrame":
 
     rows = [
         (
-            *(each.blasts, each.load, each.threats, len(each.layout), each.cost),
-            layout_text(each.layout),
+            *(
+                candidate.blasts,
+                candidate.load,
+                candidate.threats,
+                len(candidate.layout),
+                candidate.cost,
+            ),
+            layout_text(candidate.layout),
         )
-        for each in candidates
+        for candidate in candidates
     ]
     columns = ["blasts", "load", "threats", "modules", "cost", "layout"]
     return pd.DataFrame(rows, columns=columns)

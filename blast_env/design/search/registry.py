@@ -99,11 +99,13 @@ def find_proposer(name: str, initial: tuple[Layout, ...] = ()) -> Proposer:
         return found
     if not _begins_with_layouts(found):
         known = proposers(ProposerKind.SEARCH)
-        names = ", ".join(each for each in known if _begins_with_layouts(find_proposer(each)))
+        names = ", ".join(
+            proposer for proposer in known if _begins_with_layouts(find_proposer(proposer))
+        )
         raise BlastEnvError(f"{name} begins with no layouts; methods that can: {names}")
     begun: Proposer = replace(found, initial=initial)  # type: ignore[type-var]
     return begun
 
 
 def _begins_with_layouts(proposer: Any) -> bool:
-    return is_dataclass(proposer) and "initial" in {each.name for each in fields(proposer)}
+    return is_dataclass(proposer) and "initial" in {field.name for field in fields(proposer)}

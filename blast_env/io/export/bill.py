@@ -129,7 +129,10 @@ def _with_costs(plan: LayoutPlan) -> list[tuple[Element, float]]:
     """Return the elements of a layout, each with its cost at its place."""
     placement = LayoutState.of(plan.scenario, plan.layout)
     number, costs = placement.catalogue.variant_number, placement.costs
-    return [(each, float(costs[number(each), each[0], each[1]])) for each in placement.layout]
+    return [
+        (element, float(costs[number(element), element[0], element[1]]))
+        for element in placement.layout
+    ]
 
 
 def bill_of_quantities(plan: LayoutPlan) -> "pd.DataFrame":
@@ -182,7 +185,7 @@ def stock_of(scenario: Scenario) -> tuple[StockLine, ...]:
         for item in zone.items
     )
     measures = (
-        StockLine(each.name, each.description, 1, nan, nan, nan, each.cost)
-        for each in zone.measures
+        StockLine(measure.name, measure.description, 1, nan, nan, nan, measure.cost)
+        for measure in zone.measures
     )
     return (*items, *measures)

@@ -60,16 +60,18 @@ def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
     zone = plan.scenario.build_zone
     if zone is None:
         return tuple(lines)
-    counts = Counter(each.item if isinstance(each, Piece) else MODULE for each in plan.layout)
-    measures = {each.name for each in zone.measures}
-    for each in stock_of(plan.scenario):
-        if each.item not in measures:
-            high = "" if each.height_m is None else f", {_number(each.height_m)} m high"
-            size = f"{_number(each.length_m)} m x {_number(each.thickness_m)} m{high}"
-            count = f"{counts[each.item]} of a stock of {each.in_stock}"
-            lines.append(f"{each.item}: {count}, {size}")
-        elif counts[each.item]:
-            lines.append(f"{each.item}: taken")
+    counts = Counter(
+        element.item if isinstance(element, Piece) else MODULE for element in plan.layout
+    )
+    measures = {measure.name for measure in zone.measures}
+    for stock_line in stock_of(plan.scenario):
+        if stock_line.item not in measures:
+            high = "" if stock_line.height_m is None else f", {_number(stock_line.height_m)} m high"
+            size = f"{_number(stock_line.length_m)} m x {_number(stock_line.thickness_m)} m{high}"
+            count = f"{counts[stock_line.item]} of a stock of {stock_line.in_stock}"
+            lines.append(f"{stock_line.item}: {count}, {size}")
+        elif counts[stock_line.item]:
+            lines.append(f"{stock_line.item}: taken")
     lines += _conditions(zone)
     if zone.budget is not None:
         cost = LayoutState.of(plan.scenario, plan.layout).cost
@@ -111,8 +113,8 @@ def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[PointM, ...], ...]:
     if zone is None or zone.clearance_m == 0.0:
         return ()
     plans = [
-        shapely.union_all([shapely.box(*box) for box in each.boxes_m])
-        for each in plan.scenario.structures
+        shapely.union_all([shapely.box(*box) for box in structure.boxes_m])
+        for structure in plan.scenario.structures
     ]
     return tuple(
         tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in ring.coords[:-1])
@@ -153,7 +155,7 @@ class Text:
 
 def key_of(plan: LayoutPlan) -> dict[str, str]:
     """Return the letter of each name that the notes explain; the same name has the same letter."""
-    names = dict.fromkeys(_name(each) for each in plan.features if _has_letter(each))
+    names = dict.fromkeys(_name(feature) for feature in plan.features if _has_letter(feature))
     return {name: letters(number) for number, name in enumerate(names)}
 
 
@@ -164,22 +166,27 @@ def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
         plan: The layout on its site.
         height_m: Height of the letters; names inside things are smaller if they must fit.
     """
-    inside = [_text_inside(each, height_m) for each in plan.features if _words_inside(each)]
+    inside = [
+        _text_inside(feature, height_m) for feature in plan.features if _words_inside(feature)
+    ]
     key = key_of(plan)
-    labels = [Label(key[_name(each)], each) for each in plan.features if _has_letter(each)]
+    labels = [
+        Label(key[_name(feature)], feature) for feature in plan.features if _has_letter(feature)
+    ]
     settled = settled_labels(
         plan.features,
         labels,
-        [Text(each.text, each.feature, (0.0, 0.0), height_m).size_m for each in labels],
-        lambda each: each.bounds_m.grown(MODULE_SIDE_M if len(each.places_m) == 1 else 0.0),
-        lambda each: each.bounds_m if len(each.places_m) > 2 else None,
+        [Text(label.text, label.feature, (0.0, 0.0), height_m).size_m for label in labels],
+        lambda label: label.bounds_m.grown(MODULE_SIDE_M if len(label.places_m) == 1 else 0.0),
+        lambda label: label.bounds_m if len(label.places_m) > 2 else None,
         plan.scenario.site.rectangle_m.grown(4.0 * height_m),
         gap=0.4 * height_m,
         far=inf,
         others=[text.box_m for text in inside],
     )
     letters = [
-        Text(each.label.text, each.label.feature, each.place.centre, height_m) for each in settled
+        Text(thing.label.text, thing.label.feature, thing.place.centre, height_m)
+        for thing in settled
     ]
     return (*inside, *letters)
 

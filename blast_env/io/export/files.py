@@ -69,7 +69,9 @@ def write_geojson(plan: LayoutPlan, path: Path) -> None:
         BlastEnvError: If the file cannot be written.
     """
     collection = feature_collection(plan)
-    features = ",\n".join(json.dumps(each, allow_nan=False) for each in collection["features"])
+    features = ",\n".join(
+        json.dumps(feature, allow_nan=False) for feature in collection["features"]
+    )
     others = {key: value for key, value in collection.items() if key != "features"}
     head = json.dumps(others, indent=0, allow_nan=False).removesuffix("\n}")
     write_text(path, f'{head},\n"features": [\n{features}\n]\n}}\n')
@@ -88,7 +90,7 @@ def _feature(
         },
         "geometry": _geometry(
             _on_map(feature.places_m, georeference),
-            [_on_map(each, georeference) for each in feature.holes_m],
+            [_on_map(hole_m, georeference) for hole_m in feature.holes_m],
         ),
     }
 
@@ -111,7 +113,7 @@ def _geometry(places: list[list[float]], holes: list[list[list[float]]]) -> dict
         return {"type": "Point", "coordinates": places[0]}
     if len(places) == 2:
         return {"type": "LineString", "coordinates": places}
-    rings = [[*each, each[0]] for each in (places, *holes)]
+    rings = [[*hole, hole[0]] for hole in (places, *holes)]
     return {"type": "Polygon", "coordinates": rings}
 
 

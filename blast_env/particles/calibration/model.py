@@ -408,9 +408,9 @@ class LoadUnit:
         if main.impulse == 0.0:
             return cls()
         loads = {
-            each.name: CalibratedLoad(each.impulse, convert(each))
-            for each in structures
-            if each.impulse > 0.0
+            structure.name: CalibratedLoad(structure.impulse, convert(structure))
+            for structure in structures
+            if structure.impulse > 0.0
         }
         width_m = _seen_width_m(main, charge.position_m)
         factor = loads[main.name].factor * width_m / MODULE_SIDE_M

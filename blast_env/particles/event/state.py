@@ -351,7 +351,12 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     loads = np.zeros(len(parts), dtype=LOAD)
     loads["first_hit_s"] = np.inf
     loads["capacity"] = [np.inf if part.capacity is None else part.capacity for part in parts]
-    structures = [box for each in scene.structures if not each.is_barrier for box in each.boxes_m]
+    structures = [
+        box
+        for structure in scene.structures
+        if not structure.is_barrier
+        for box in structure.boxes_m
+    ]
     targets = UNITS_PER_M * np.array(structures, dtype=np.float64).reshape(-1, 4)
     progress = np.zeros(1, dtype=PROGRESS)[0]
     cells = _cells(scene.site, rules)
