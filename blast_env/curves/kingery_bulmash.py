@@ -77,6 +77,8 @@ class _Curve:
 
     def at(self, z: FloatArray) -> FloatArray:
         """Return the scaled quantity, SI, at scaled distances within the range."""
+        # log10 of the quantity is a polynomial in u = a + b log10 Z, segment by segment (Kingery &
+        # Bulmash 1984).
         joints = [segment.z_min for segment in self.segments[1:]]
         which = np.searchsorted(joints, z, side="right")
         value = np.empty_like(z)
@@ -144,6 +146,7 @@ def kingery_bulmash(
             f"scaled distance Z{place} is {z[index]:.6g} m/kg^(1/3), must be {low:g} to {high:g}: "
             f"the range of Kingery and Bulmash's {burst} {quantity}"
         )
+    # A Z beyond an end by rounding alone is taken as the end.
     value = curve.at(np.clip(z, low, high))
     if curve.scales_with_charge:
         value = value * np.cbrt(charge)

@@ -63,6 +63,7 @@ class Ways(NamedTuple):
         """Return the ways from a charge to places (n, 3) with outward normals (n, 3)."""
 
         def way(height_m: float) -> tuple[FloatArray, FloatArray]:
+            # The image in a rigid ground lies as deep as the charge is high.
             way_m = np.array([*charge_m[:2], height_m]) - places_m
             away_m: FloatArray = np.linalg.norm(way_m, axis=-1)
             return away_m, (way_m * outward).sum(axis=-1) / away_m
@@ -110,6 +111,7 @@ def normally_reflected(
         in_air = 2.0 * within_curves(reflected, distance_m, charge_kg, "spherical")
     else:
         incident = within_curves(_NAMES[load][1], distance_m, charge_kg, "spherical")
+        # Two incident waves as one shock, which the wall reflects as one.
         in_air = normally_reflected_pa(2.0 * incident)
     return np.asarray((1.0 - share) * on_ground + share * in_air)
 
@@ -152,6 +154,9 @@ def _in_the_air(load: Load, ways: Ways, charge_kg: float) -> FloatArray:
         reflected = [within_curves(_NAMES[load][0], item, charge_kg, burst) for item in both_m]
         own, mirrored = (oblique(*wave) for wave in zip(reflected, incident, cosines, strict=True))
         return np.where(ways.seen, own + mirrored, side_on)
+    # (1) How much the ground reflects; (2) side-on, both waves as one shock, the mirrored one
+    # increased by what the ground reflects beyond twice; (3) on the wall by the angle of either
+    # wave, the larger.
     on_ground = reflected_pa(incident[0], ways.ground_cosine) / incident[0]
     side_on = incident[0] + np.maximum(on_ground - 1.0, 1.0) * incident[1]
     peaks = [reflected_pa(side_on, cosine) for cosine in cosines]

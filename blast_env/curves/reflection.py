@@ -38,6 +38,9 @@ def reflected_pa(incident_pa: FloatArray, cosine: FloatArray) -> FloatArray:
         np.clip(np.asarray(incident_pa) / AMBIENT_PA, _LEAST_SHOCK, _MOST_SHOCK),
         np.arccos(np.clip(cosine, 0.0, 1.0)),
     )
+    # (1) The angle at which the Mach stem begins; (2) the regular peak at the angle or, beyond, at
+    # that limit; (3) from there to the incident peak with the square root of the angle that is
+    # left.
     limit = _limit_rad(shock)
     regular = _regular(shock, np.minimum(angle, limit))
     left = np.clip((0.5 * np.pi - angle) / (0.5 * np.pi - limit), 0.0, 1.0)
@@ -68,18 +71,26 @@ def _regular(shock: FloatArray, angle: FloatArray) -> FloatArray:
     solution is left, is up to a degree later.
     """
     ahead = np.maximum(angle, _NORMAL_RAD)
+    # 1. Rankine and Hugoniot for gamma = 1.4: ms^2 = 1 + 6/7 P / P_0; ahead of it the flow is at
+    # rest.
     ms2 = 1.0 + 6.0 / 7.0 * shock
     m1_2 = ms2 / np.sin(ahead) ** 2
+    # 2. The theta-beta-M relation of oblique shocks, with beta the angle of incidence.
     turn = 2.0 / np.tan(ahead) * (ms2 - 1.0) / (m1_2 * (1.4 + np.cos(2.0 * ahead)) + 2.0)
     theta = np.arctan(turn)
+    # The Mach number behind a normal shock, over the sine of the angle that is left.
     m2_2 = (ms2 + 5.0) / (7.0 * ms2 - 1.0) / np.sin(ahead - theta) ** 2
+    # 3. The weak solution for the same turn back; NaN where no attached shock turns the flow so
+    # far.
     root, share = _weak_shock(m2_2, turn)
     with np.errstate(invalid="ignore"):
         cosine = np.cos((4.0 * np.pi + np.arccos(share)) / 3.0)
         beta = np.arctan((m2_2 - 1.0 + 2.0 * root * cosine) / (3.0 * (1.0 + 0.2 * m2_2) * turn))
+    # 4. Normal-shock relations across the reflected shock.
     across = m2_2 * np.sin(beta) ** 2
     m3_2 = (across + 5.0) / (7.0 * across - 1.0) / np.sin(beta - theta) ** 2
     behind = 1.0 + 7.0 / 6.0 * (across - 1.0)
+    # The sonic criterion: regular only while the flow behind both shocks is supersonic.
     return np.where(m3_2 >= 1.0, (1.0 + shock) * behind - 1.0, np.nan)
 
 
@@ -106,6 +117,7 @@ def _limits() -> tuple[FloatArray, FloatArray]:
     """Return logarithms of shocks, and the largest angles of regular reflection, by bisection."""
     shocks = np.geomspace(_LEAST_SHOCK, _MOST_SHOCK, 400)
     low, high = np.full_like(shocks, 0.5), np.full_like(shocks, 0.5 * np.pi - 1e-6)
+    # Below the limit the reflection is regular and above it is not: the sign of the bisection.
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         is_regular = np.isfinite(_regular(shocks, middle))

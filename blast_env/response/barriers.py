@@ -87,6 +87,7 @@ class RigidPiece:
             friction: Coefficient of friction with the ground; `FRICTION` by default.
             anchorage_n: Horizontal capacity of all its anchors together.
         """
+        # Everything per metre of length: rocking and sliding across the length do not depend on it.
         block_kg = CONCRETE_KG_M3 * length_m * thickness_m * height_m
         return cls(
             height_m,
@@ -163,11 +164,13 @@ def piece_responses(
     from blast_env.response.kernels import move_piece
 
     rows = np.zeros((len(pieces), 4))
+    # A piece that rocks may overturn after the load: the motion goes on for three seconds.
     steps = int(np.ceil((float(time_s[-1] - time_s[0]) + _AFTER_S) / _STEP_S))
     begin_s = float(time_s[0])
     at_s = begin_s + _STEP_S * np.arange(steps + 1)
     for index, piece in enumerate(pieces):
         force = piece.height_m * np.interp(at_s, time_s, pressure_pa[index], left=0.0, right=0.0)
+        # Anchors hold the whole force or, once they fail, nothing: no energy is taken.
         held = bool(piece.anchor_n_m > 0.0 and np.abs(force).max() <= piece.anchor_n_m)
         if held:
             rows[index] = 0.0, 0.0, np.inf, 1.0

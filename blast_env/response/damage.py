@@ -72,6 +72,8 @@ def bay_damages(
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
         peak_factor: Factor on peaks to make them as sharp as in the open; 1 without clipping.
     """
+    # (1) One row per component that a bay may have; (2) the damage under the histories as they are;
+    # (3) under sharper ones; (4) the worse by bay and component.
     places = [
         (index, name, filled)
         for index, bay in enumerate(bays)

@@ -172,6 +172,7 @@ def divide(
     for wall in walls:
         before = 0
         for line_number, line, low, high in _stretches(ground_m, wall, lines):
+            # Bays of a polygon's side are counted on over all of its walls.
             count = _bays_along(high - low, bay_m)
             ends = np.linspace(low, high, count + 1).tolist()
             bays += [
@@ -500,12 +501,15 @@ def rescaled(
     Returns:
         Times (finer than before), and histories (bays, times).
     """
+    # (1) Finer times, since a compressed history has its points closer together; (2) longer ones
+    # for stretched histories; (3) each history about its own arrival.
     steps = np.arange(_FINER * (len(time_s) - 1) + 1) / _FINER
     times_s = np.interp(steps, np.arange(len(time_s)), time_s)
     if (longest := float(durations.max(initial=1.0))) > 1.0:
         times_s = time_s[0] + longest * (times_s - time_s[0])
     found = np.zeros((len(pressure_pa), len(times_s)))
     for index, history in enumerate(pressure_pa):
+        # Half of the peak is where a front smeared over cells arrives.
         arrival_s = time_s[np.argmax(history >= 0.5 * history.max())]
         before_s = arrival_s + (times_s - arrival_s) / durations[index]
         found[index] = peaks[index] * np.interp(before_s, time_s, history, left=0.0, right=0.0)
@@ -539,6 +543,7 @@ def respond(
     walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
     panes = _panes(bays)
     panels = _panels(bays)
+    # Once with suction and once without: see above for the reason.
     pushed_pa = pushes(time_s, pressure_pa)
     return FacadeResponse(
         bays=tuple(bays),

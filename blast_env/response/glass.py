@@ -293,6 +293,8 @@ class PaneCurve:
     def of(cls, pane: Pane) -> "PaneCurve":
         """Return the curve of a pane, or of both panes of double glazing bending as one."""
         own = _single(pane, pane.thickness_m)
+        # Treated glass bends as annealed glass and breaks as annealed glass at a load that is
+        # smaller by the type factor of E1300.
         weaker = own.load_pa / pane.kind.type_factor
         risk = np.exp(np.interp(np.log(weaker), np.log(own.load_pa), np.log(own.risk_60)))
         below = weaker < own.load_pa[0]  # there, the risk is proportional to the load to the m
@@ -300,6 +302,7 @@ class PaneCurve:
         load = own.load_pa
         if pane.outer_thickness_m:
             outer = _single(pane, pane.outer_thickness_m)
+            # Both panes of double glazing have the same deflection, and share the load.
             load = load + np.exp(
                 np.interp(
                     np.log(own.deflection_m), np.log(outer.deflection_m), np.log(outer.load_pa)
@@ -335,9 +338,13 @@ def _slopes(points: FloatArray, values: FloatArray) -> FloatArray:
 
 def _single(pane: Pane, thickness_m: float) -> PaneCurve:
     curve = plate_curve(pane.aspect_ratio)
+    # The plate table is dimensionless: deflection over thickness, load in E (t / a)^4, and stresses
+    # in E (t / a)^2.
     load = curve.load * YOUNG_PA * (thickness_m / pane.short_m) ** 4
+    # Risk of E1300: B = k / A^(m - 1) (E t^2)^m exp(J); the table has the last factor.
     scale = FLAW_K / pane.area_m2 ** (WEIBULL_M - 1.0) * (YOUNG_PA * thickness_m**2) ** WEIBULL_M
     risk = scale * curve.risk
+    # K_LM changes with the shape: that at the median breakage, B = ln 2, stands for all.
     breaks = int(np.clip(np.searchsorted(risk, np.log(2.0)), 0, len(risk) - 1))
     return PaneCurve(
         curve.deflection * thickness_m, load, risk, float(curve.load_mass_factor[breaks])
@@ -413,6 +420,7 @@ def glazing_responses(
     thrown_by = np.reshape([pane.thrown_by for pane in panes], (len(panes), 5))
     stretched, speed, flight, hit = _thrown(rows, thrown_by)
     retained = stretched <= 1.0
+    # GSA's order: unbroken, retained by the interlayer, then by how far the fragments fly.
     condition = np.where(
         probability <= limit_probability,
         GlazingCondition.NO_BREAK,
@@ -426,6 +434,7 @@ def glazing_responses(
         (flight - _NEAR_M) / (_PANEL_M - _NEAR_M),
         1.0 - _PANEL_M / np.maximum(flight, _PANEL_M),
     )
+    # Both conditions on the panel have one scale, from 4 to 5: the farther, the higher.
     level = np.minimum(condition, GlazingCondition.LOW_ON_PANEL) - GlazingCondition.NO_BREAK
     hazard = level + np.minimum(np.choose(level, shares), _BELOW_1)
     return GlazingResponses(
@@ -459,6 +468,8 @@ def drawn_conditions(
     """
     rows, impulse_pa_s = np.zeros((len(draws[0]), 7)), impulses(time_s, pressure_pa)
     for row, (peak, duration, weaker) in zip(rows, np.transpose(draws).tolist(), strict=True):
+        # A pane stronger than the share `weaker` of all panes breaks at the risk B = -ln(1 -
+        # weaker).
         loads = duration * time_s, peak * pressure_pa, peak * duration * impulse_pa_s
         _bend(pane, *loads, -np.log1p(-weaker), row)
     stretched, _, flight, hit = _thrown(rows, np.tile(pane.thrown_by, (len(rows), 1)))
@@ -509,6 +520,7 @@ def _thrown(
     thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
     stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)
     speed = np.where(stretched <= 1.0, 0.0, thrown_m_s)
+    # Thrown horizontally from the middle of the pane, without drag: free fall to the floor.
     flight = speed * np.sqrt(2.0 * middle_m / _GRAVITY_M_S2)
     return stretched, speed, flight, _hit_height_m(middle_m, speed)
 
@@ -518,6 +530,7 @@ def _edge_forces_n_m(panes: Sequence[Pane], whole_m: FloatArray, broken: BoolArr
     forces = []
     for pane, deflection_m, is_broken in zip(panes, whole_m, broken, strict=True):
         reached_m, pressure_pa, _ = pane.curve.bending
+        # The edges carry the resistance, not the load: inertia takes the difference.
         force = pane.on_edges_n_m(float(np.interp(deflection_m, reached_m, pressure_pa)))
         holds = pane.interlayer
         forces.append(max(force, holds.tension_n_m) if is_broken and holds else force)
@@ -536,6 +549,7 @@ def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArr
 
 def _hit_height_m(middle_m: FloatArray, speed_m_s: FloatArray) -> FloatArray:
     """Return the height at which the middle hits a panel 3 m behind; -1 if it lands before."""
+    # The fall during the flight to the witness panel of GSA's test, 3 m behind the window.
     falls_s = _PANEL_M / np.maximum(speed_m_s, _SLOWEST_M_S)
     height = middle_m - 0.5 * _GRAVITY_M_S2 * falls_s**2
     return np.where(height > 0.0, height, -1.0)

@@ -21,6 +21,8 @@ _MOST_TIMES: Final = 50
 @njit(cache=True)
 def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
     """Return the index of the end of a polyline's segment at a place, searched from `begin`."""
+    # Neighbouring steps lie on the same or the next segment: a walk from the last one is shorter
+    # than a bisection.
     upper = begin
     while upper < len(points) - 1 and points[upper] < at:
         upper += 1
@@ -61,6 +63,7 @@ def impulse_until(
     place = begin
     while time_s[place + 1] < at_s:
         place += 1
+    # I(t) = I_k + p_k s + slope s^2 / 2, with s the time since point k.
     gone_s = at_s - time_s[place]
     slope = (pressure_pa[place + 1] - pressure_pa[place]) / (time_s[place + 1] - time_s[place])
     return impulse_pa_s[place] + gone_s * (pressure_pa[place] + 0.5 * slope * gone_s), place
@@ -96,6 +99,8 @@ def integrate(
     3. v_(n+1/2) = v_(n-1/2) + (I(t_n + dt / 2) - I(t_n - dt / 2) - dt r) / m;
     4. the extremes, and the end.
     """
+    # Leapfrog: the first speed is that at the middle of the first step, from the impulse until
+    # then.
     x, offset, is_cracked = 0.0, 0.0, 0.0
     largest, resistance = 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
@@ -111,6 +116,8 @@ def integrate(
             resistance = polyline(points, values, x - offset)
             grown = polyline(growth_points, growth, abs(x))
             if resistance > cap * grown:
+                # The plastic deflection grows by what exceeds the yield resistance over the first
+                # slope, so that unloading is parallel to it.
                 offset += (resistance - cap * grown) / (values[1] / points[1])
                 resistance = cap * grown
             elif resistance < -rebound_cap * grown:
@@ -164,6 +171,8 @@ def bend(
     x, damage, peak = 0.0, 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
     v = pushed / mass
+    # The history is kept, because the strength of the median broken pane follows from the whole
+    # damage and is looked up afterwards. Durations are in units of 60 s, as E1300's risk.
     track, per_step = np.empty((3, steps)), step_s / 60.0
     bent, worn = 1, 1  # segments of the two polylines, which change little between steps
     for step in range(steps):
@@ -182,11 +191,13 @@ def bend(
         if x != 0.0:
             log_x = np.log(abs(x))
             worn = end_of_segment(log_points, log_x, worn)
+            # A power law between points: linear in logarithms.
             rate = log_rate[worn] + log_slopes[worn] * (log_x - log_points[worn])
             damage += per_step * np.exp(rate)
         track[0, step], track[1, step], track[2, step] = damage, x, v
     # 3. and 4. The share that breaks, and when.
     share = -np.expm1(-(damage**exponent))
+    # The median of those that break: half of the share, as a risk B = -ln(1 - share / 2).
     risk = strength if strength > 0.0 else -np.log1p(-0.5 * share)
     broken = min(np.searchsorted(track[0], risk ** (1.0 / exponent)), steps - 1)
     break_s = time_s[0] + (broken + 1) * step_s
@@ -194,6 +205,8 @@ def bend(
     if break_s < time_s[-1]:
         after = np.searchsorted(time_s, break_s, side="right")
         gone = (break_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
+        # The largest impulse still to come, not all of it: later suction does not call fragments
+        # back.
         there = pressure_pa[after - 1] + gone * (pressure_pa[after] - pressure_pa[after - 1])
         come = 0.5 * (there + pressure_pa[after]) * (time_s[after] - break_s)
         left = max(come, 0.0)
@@ -203,6 +216,7 @@ def bend(
             left = max(left, come)
     out[0], out[1], out[2] = peak, share, break_s
     out[3], out[4], out[5] = track[1, broken], track[2, broken], left
+    # Frames have to hold until nearly all panes have broken.
     last = np.searchsorted(track[0], _STRONGEST ** (1.0 / exponent))
     out[6] = max(0.0, track[1, : last + 1].max())
 
@@ -225,6 +239,7 @@ def move_piece(
     3. flat on the ground without a moment that lifts it, it slides alone;
     4. friction stops a sliding piece, but does not reverse it; it lands without bouncing.
     """
+    # A rectangular block about its centre; it overturns when its centre is above the edge.
     inertia = mass * (height * height + base * base) / 12.0
     limit = np.arctan(base / height)
     x, v, angle, speed, far, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -235,24 +250,32 @@ def move_piece(
             side = 1.0 if angle > 0.0 else -1.0
         # from here on in the direction of the edge
         own, own_v, tilt, turning = side * push, side * v, abs(angle), side * speed
+        # Horizontal and vertical distance of the centre from the edge; the force acts on the middle
+        # of the tilted side.
         arm = 0.5 * (base * np.cos(tilt) - height * np.sin(tilt))
         rise = 0.5 * (height * np.cos(tilt) + base * np.sin(tilt))
         tipping = 0.5 * own * height * np.cos(tilt)
+        # 1. About the edge that holds: moment over the inertia about it (Steiner).
         turns = (tipping - mass * 9.81 * arm) / (inertia + mass * (arm * arm + rise * rise))
         if tilt == 0.0 and turns <= 0.0:
             turns = 0.0
+        # Friction and weight at the edge from the acceleration of the centre, tangential and
+        # centripetal.
         slides, held = 0.0, own - mass * (turns * rise + turning * turning * arm)
         weight = max(mass * (9.81 + turns * arm - turning * turning * rise), 0.0)
         if own_v != 0.0 or abs(held) > friction * weight:
+            # 2. The edge slides: Coulomb friction opposes the motion, or the force that starts it.
             against = friction if own_v > 0.0 or (own_v == 0.0 and held > 0.0) else -friction
             lever = against * rise - arm
             off = 0.5 * own * base * np.sin(tilt)
             turns = mass * (9.81 - turning * turning * rise) * lever - off
             turns /= inertia - mass * arm * lever
+            # 3. Flat on the ground, without a moment that lifts it.
             if tilt == 0.0 and turns <= 0.0:
                 turns = 0.0
             weight = max(mass * (9.81 + turns * arm - turning * turning * rise), 0.0)
             slides = (own - against * weight) / mass - turns * rise - turning * turning * arm
+        # 4. Friction stops a sliding piece within the step, and the piece lands without a bounce.
         new_v = own_v + slides * step_s
         if own_v * new_v < 0.0:
             new_v = 0.0

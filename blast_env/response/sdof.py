@@ -89,6 +89,7 @@ class Resistance:
         cls, stiffness_pa_m: float, cap_pa: float, rebound_cap_pa: float | None = None
     ) -> "Resistance":
         """Return a bilinear resistance: elastic, then perfectly plastic."""
+        # Elastic to the cap, perfectly plastic beyond it.
         yield_m = cap_pa / stiffness_pa_m
         return cls(
             np.array([0.0, yield_m]),
@@ -171,6 +172,8 @@ def responses(
         )
     if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
         raise BlastEnvError("time_s must ascend, and have at least two times")
+    # The impulse until each point is summed once; the kernel interpolates in it, so that a load
+    # shorter than a step is not missed.
     rows, impulse_pa_s = np.zeros((len(systems), 6)), impulses(time_s, pressure_pa)
     for index, system in enumerate(systems):
         history = time_s, pressure_pa[index], impulse_pa_s[index]
@@ -194,6 +197,7 @@ def drawn_responses(
     """
     rows, impulse_pa_s = np.zeros((len(draws[0]), 6)), impulses(time_s, pressure_pa)
     for row, (peak, duration, strength) in zip(rows, np.transpose(draws).tolist(), strict=True):
+        # A factor on pressures and one on times multiply the impulse together.
         history = duration * time_s, peak * pressure_pa, peak * duration * impulse_pa_s
         _integrate(system, history, strength, STEPS_PER_PERIOD, row)
     return Responses(*rows.T)
@@ -218,7 +222,9 @@ def _integrate(
     from blast_env.response.kernels import integrate
 
     resistance, time_s = system.resistance, history[0]
+    # Strength multiplies the stiffness too, so a period goes with 1 / sqrt(strength).
     step_s = system.shortest_period_s / (steps_per_period * sqrt(strength))
+    # The largest deflection may come after the load: one more period has it in free vibration.
     lasts_s = float(time_s[-1] - time_s[0]) + _PERIODS_AFTER_LOAD * system.period_s / sqrt(strength)
     integrate(
         system.load_mass_factor * system.mass_kg_m2,
@@ -240,6 +246,7 @@ def _integrate(
 
 def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     """Return the impulse of histories until each point, Pa s, in the shape of the pressures."""
+    # Trapezia are exact, since the pressure is linear between the points of a history.
     steps = 0.5 * (pressure_pa[..., 1:] + pressure_pa[..., :-1]) * np.diff(time_s)
     impulse_pa_s = np.zeros(pressure_pa.shape)
     np.cumsum(steps, axis=-1, out=impulse_pa_s[..., 1:])

@@ -363,11 +363,15 @@ class Panel:
         """
         moment, bending = self.section.moment_n, self.section.bending_stiffness_n_m
         length = self.span_m
+        # Static deflections of beams under a uniform load; hinges form where the moment is largest.
         simple = 384.0 * bending / (5.0 * length**4)
         if self.supports is Supports.SIMPLE:
             return simple, 8.0 * moment / length**2
         if self.supports is Supports.CANTILEVER:
             return 8.0 * bending / length**4, 2.0 * moment / length**2
+        # Fixed at both ends: (1) elastic to 12 M / L^2, where the ends yield; (2) as a simple span
+        # to 16 M / L^2, where the middle yields; (3) one line to the cap with the work of both (UFC
+        # 3-340-02, section 3-13).
         cap = 16.0 * moment / length**2
         first_m = (12.0 * moment / length**2) / (5.0 * simple)
         last_m = first_m + (4.0 * moment / length**2) / simple
@@ -380,6 +384,7 @@ class Panel:
 
         A membrane of tension T takes over where 8 T x / L^2 exceeds the resistance in bending.
         """
+        # Moments grow with the hardening of the steel; a cantilever has nothing to hang from.
         bends = [section.moment_at(value) / section.moment_n for value in _ROTATIONS_DEG]
         arm_m = self.span_m if self.supports is Supports.CANTILEVER else 0.5 * self.span_m
         deflection_m = arm_m * np.tan(np.radians(_ROTATIONS_DEG))
@@ -398,6 +403,8 @@ class Panel:
         """
         section = self.section
         thickness = section.thickness_m  # type: ignore[union-attr]
+        # Moment equilibrium of one half about its end: its weight acts with the arm of the
+        # thickness.
         weight = 4.0 * section.mass_kg_m2 * _GRAVITY_M_S2 * thickness / self.span_m
         first_m = 0.01 * thickness
         return Resistance(
@@ -432,6 +439,7 @@ def load_mass_factors(supports: Supports) -> tuple[float, float]:
     The elastic shape is the static deflection under a uniform load, the plastic one the mechanism
     with straight sides.
     """
+    # Means over the span by the midpoint rule.
     s = (np.arange(2000) + 0.5) / 2000.0
     if supports is Supports.SIMPLE:
         elastic, plastic = s - 2.0 * s**3 + s**4, 1.0 - np.abs(2.0 * s - 1.0)
@@ -500,9 +508,11 @@ def panel_responses(
         BlastEnvError: If there is not one history per panel.
     """
     motion = responses([panel.system for panel in panels], time_s, pressure_pa)
+    # Rebound outwards damages as deflection inwards does.
     most = np.maximum(motion.peak_m, -motion.rebound_m)
     ductility = most / np.array([panel.system.resistance.yield_m for panel in panels])
     rotation, damage = np.zeros(len(panels)), np.zeros(len(panels))
+    # Equal panels together: limits and rotations are evaluated once for all bays of a type.
     of_panels: dict[Panel, list[int]] = {}
     for index, panel in enumerate(panels):
         of_panels.setdefault(panel, []).append(index)
@@ -510,7 +520,9 @@ def panel_responses(
         rotation[own] = panel.rotation_deg(most[own])
         damage[own] = panel.section.limits.measure(ductility[own], rotation[own])
     carried_m = [
-        panel.span_m * (1.0 if panel.supports is Supports.CANTILEVER else 0.5) for panel in panels
+        # Each of two supports has half of the load on the span, a single one all of it.
+        panel.span_m * (1.0 if panel.supports is Supports.CANTILEVER else 0.5)
+        for panel in panels
     ]
     force = motion.largest_resistance_pa * np.array(carried_m)
     return PanelResponses(motion, ductility, rotation, damage, force)

@@ -288,20 +288,26 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     broken: tuple[RatedPiece, ...] = ()
     if motion is None:
         return Drive(ground, _reach(ground, obstacles, held, broken), held, broken)
+    # 1. Too light a rating for the mass: the piece breaks at any speed.
     broken = tuple(
         rated_piece for rated_piece in held if rated_piece.rating.mass_kg < motion.mass_kg
     )
     held = tuple(rated_piece for rated_piece in held if rated_piece not in broken)
+    # 2. Of the rest, only pieces rated below the vehicle's largest speed can be hit too fast.
     slow = tuple(
         rated_piece for rated_piece in held if rated_piece.rating.speed_km_h < motion.max_speed_km_h
     )
     if slow:  # speeds are largest on the site without barriers, which is computed only once
         slow = _too_slow(slow, _free_speeds(ground))
+    # 3. Broken pieces open ways and longer run-ups: repeat until no further piece breaks. Pieces
+    # only ever break, so it ends after at most as many rounds as there are pieces.
     while True:
         reach = _reach(ground, obstacles, held, broken)
         weak: tuple[RatedPiece, ...] = ()
         if slow:
             is_open = reach.near(*_places_shape(ground), STEP_M)
+            # The speeds on the empty site bound those on this one from above: they clear most
+            # pieces without a search of their own.
             weak = _too_slow(slow, _free_speeds(ground), is_open)
             weak = weak and _weak_on(ground, _as_bits(is_open), weak)
         if not weak:
@@ -384,6 +390,7 @@ def _weak_on(
         bits: The open places, packed.
         pieces: The pieces.
     """
+    # Fewer arcs give speeds from below: what breaks by them breaks.
     if _too_slow(pieces, _speeds_on(ground, bits, _FEW_ARCS)) == pieces:
         return pieces
     return _too_slow(pieces, _speeds_on(ground, bits))

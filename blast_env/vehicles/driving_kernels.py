@@ -57,6 +57,8 @@ def spread(
     spot_limit = np.float32(spot_most)  # in the precision of labels, else the loop would not end
     slow_limit = np.float32(slow_most)
     arcs = np.searchsorted(of[:, 0], np.arange(count + 1))
+    # Label correcting: sweep each direction along itself, so that one sweep carries a label to the
+    # end of its line; then the arcs; repeat until no label grows.
     while changed.any():
         for number in range(count):
             x, y = directions[number]
@@ -69,6 +71,7 @@ def spread(
                     if not changed[number, row, column]:
                         continue
                     label = labels[number, row, column]
+                    # A turn on the spot leaves at most this run-up, in all directions.
                     spot = min(label, spot_limit)
                     if is_wide[row, column] and spot > spots[row, column]:
                         spots[row, column] = spot
@@ -79,6 +82,7 @@ def spread(
                     up, right = row + y, column + x
                     if not (0 <= up < rows and 0 <= right < columns and is_open[up, right]):
                         continue
+                    # The run-up grows by the step, up to what the speed limit there allows.
                     value = min(label + lengths[number], most[up, right])
                     if value > labels[number, up, right] and _is_passed(is_open, row, column, x, y):
                         labels[number, up, right] = value
@@ -95,9 +99,12 @@ def spread(
                         other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
                         if not (0 <= up < rows and 0 <= right < columns):
                             continue
+                        # An arc bounds the speed by its lateral acceleration, hence the run-up.
                         value = min(label + arc_lengths[arc], arc_most[arc])
                         if value <= labels[other, up, right]:
                             continue
+                        # Every place along the arc must be open; slow ground on it bounds the speed
+                        # at its end.
                         for point in range(first[arc], first[arc + 1]):
                             v, u = row + points[point, 1], column + points[point, 0]
                             if not (0 <= v < rows and 0 <= u < columns and is_open[v, u]):
@@ -154,6 +161,7 @@ def fastest_into(
             y = place_m * row
             if not bottom + epsilon_m < y + step_y < top - epsilon_m:
                 continue
+            # The step must begin outside and cross a side, not run along it.
             inwards_y = (step_y > 0.0 and y <= bottom + slack_m) or (
                 step_y < 0.0 and y >= top - slack_m
             )

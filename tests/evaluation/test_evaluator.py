@@ -18,7 +18,7 @@ from tests.scenarios import BALLISTIC_COURTYARD
 
 def same(one: BlastLoads, other: BlastLoads) -> bool:
     """Whether two loads are equal to the last bit."""
-    modules = np.array_equal(one.module_impulse_sim, other.module_impulse)
+    modules = np.array_equal(one.module_impulse_sim, other.module_impulse_sim)
     return modules and one.structures == other.structures
 
 

@@ -111,7 +111,7 @@ def why_nothing(scenario: AnyScenario, charge: AnyCharge | None) -> str:
 
 def rule_row(title: str, rule: Rule, *needs: Need) -> ProposerRow:
     """Return the description of a rule, which has the name of its function."""
-    make = partial(RuleProposer, rule.__name__, rule)  # type: ignore[attr-defined]
+    make = partial(RuleProposer, rule.__name__, rule)
     return ProposerRow(make, title, ProposerKind.RULE, needs, budget=0)
 
 

@@ -63,6 +63,9 @@ class GeneticSearch(Search):
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             return session.assess(layouts)[:, np.newaxis]
 
+        # (1) A quarter of the exploration goes to random layouts and the rules'; (2) the best of
+        # them are the first population, steady-state with half as many children as parents; (3)
+        # pymoo evolves.
         count = max(size, round(self.starting_share * plan.exploring_layouts))
         drawn = (self.draw(scenario, session.rng) for _ in range(count))
         of_rules = rule_layouts(session.problem) if self.from_rules else ()
@@ -114,6 +117,8 @@ class Nsga2Search(Search):
         size = 2 * population_size(session.plan.exploring_layouts)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
+            # Load and price conflict: NSGA-II (Deb and others 2002) keeps the non-dominated layouts
+            # apart by their crowding distance.
             prices = [problem.price(layout) for layout in layouts]
             return np.column_stack([session.assess(layouts), prices])
 

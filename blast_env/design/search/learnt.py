@@ -73,6 +73,7 @@ class Guesses:
         """Return the predicted value of the objective for each layout (layouts,)."""
         new = [layout for layout in dict.fromkeys(layouts) if layout not in self._known]
         if new:
+            # One call of the network per threat for all layouts: it is fast in batches.
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
             for layout, loads in zip(new, np.transpose(by_threat), strict=True):
                 self._known[layout] = self.case.objective_value(loads, layout)
@@ -112,6 +113,8 @@ def improved(
     """
     guesses.loads([tuple(sorted(layout)) for layout in begin_with])
     moves, end = Moves(guesses.case.scenario), guesses.count + most
+    # Moves may lead back to known layouts, which add none: a bound on the tries ends the search on
+    # small sites.
     tries = 0
     while guesses.count < end and tries < 4 * most:
         tell(1.0 - (end - guesses.count) / most)
@@ -229,6 +232,8 @@ class LearntSearch(Search):
 
     def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Divide the blasts; with a surrogate and a hidden charge, favour threats over layouts."""
+        # A surrogate ranks layouts, but not the scatter over places: a few places suffice while
+        # exploring, and a reserve is kept for the choice under all of them.
         plan = Plan.of(problem, budget)
         most = len(problem.threats)
         places = min(max(plan.threats, _LEAST_PLACES), most, budget)
@@ -272,9 +277,11 @@ class LearntSearch(Search):
         rules = layouts_by_rule(scenario, known_charge).values()
         proposed: list[Layout] = []
         if self.agent is not None:
+            # 1. The agent's layout and samples, if there is one.
             drawn = self.agent.sample(scenario, known_charge, self.agent_draws, session.seed)
             proposed = [self.agent.propose(scenario, known_charge), *drawn]
         session.assess(proposed[:1])
+        # 2. A search by predictions alone, from no barrier, the rules' and the agent's layouts.
         found = improved(guesses, [(), *rules, *proposed], self.guesses, session.rng)
         layouts = session.plan.exploring_layouts
         share = max(1, round(self.guessed_share * layouts))
@@ -283,15 +290,20 @@ class LearntSearch(Search):
         tried = {*proposed[:1]}
 
         def try_best(candidates: Sequence[Layout]) -> None:
+            # The correction learns from each blast, so the likeliest candidate may change after
+            # every one.
             new = [candidate for candidate in dict.fromkeys(candidates) if candidate not in tried]
             chosen = estimates.likeliest(new or candidates)
             tried.add(chosen)
             session.assess([chosen])
 
+        # 3. In turn the best by predictions and the rules' layouts: the rules guard against a
+        # surrogate that is wrong on this site.
         for number in range(share):
             try_best(found[:_POOL])
             try_best(ruled[number : number + 1] or found[:_POOL])
         moves = Moves(scenario)
+        # 4. Changes of the best by corrected predictions; the session ends it by its budget.
         while True:
             best = estimates.ranked()[:_KEPT]
             try_best([moves.near_best(best, session.rng) for _ in range(self.drawn)])

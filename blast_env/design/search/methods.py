@@ -57,6 +57,7 @@ class Cooling:
     @property
     def temperature(self) -> float:
         """The temperature, in the unit of the load."""
+        # Geometric: equal shares of the budget lower the temperature by equal factors.
         temperature: float = self._scale * self._hot * (self._cold / self._hot) ** self.share
         return temperature
 
@@ -97,6 +98,8 @@ class PopulationAnnealingSearch(Search):
     def explore(self, session: SearchSession) -> None:
         """Draw initial layouts, and let walkers start from the best of them."""
         scenario, rng, plan = session.problem.scenario, session.rng, session.plan
+        # (1) Initial layouts: given ones, the rules', random ones; (2) the best of them become
+        # walkers; (3) walk.
         walkers = round(0.4 * plan.exploring_layouts**0.5)
         walkers = int(np.clip(walkers, _LEAST_WALKERS, _MOST_WALKERS))
         count = max(walkers, round(self.starting_share * plan.exploring_layouts))
@@ -112,12 +115,16 @@ class PopulationAnnealingSearch(Search):
         cooling = Cooling(session, float(loads.min()), self.hot, self.cold)
         while loads.min() > 0.0:
             share, temperature = cooling.share, cooling.temperature
+            # 1. One neighbour per walker, blasted in one batch.
             neighbours = [moves.neighbour(layout, rng) for layout in layouts]
             worse = session.assess(neighbours) - loads
+            # 2. Metropolis and others 1953: accept with probability min(1, exp(-worse / T)).
             accepted = rng.random(len(layouts)) < np.exp(-np.maximum(worse, 0.0) / temperature)
             for index in np.flatnonzero(accepted).tolist():
                 layouts[index] = neighbours[index]
                 loads[index] += worse[index]
+            # 3. At equal intervals of the budget the worst walkers restart from the best ones, rank
+            # by rank.
             if int(share * (self.exchanges + 1)) > exchanged:
                 exchanged += 1
                 order = np.argsort(loads, kind="stable")
@@ -138,6 +145,7 @@ class BestRuleSearch(Search):
     def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Plan as many threats per layout as the budget pays for, at least one."""
         layouts = len(rule_layouts(problem))
+        # Few rules: what is left of the budget buys more threats for each, not more layouts.
         return Plan(max(1, min(len(problem.threats), budget // layouts)), budget)
 
     def explore(self, session: SearchSession) -> None:

@@ -79,6 +79,8 @@ class SpatialCrossover(Crossover):
 
 def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
     """Return the first elements of one layout and the last of another, in a random direction."""
+    # Order the elements of both parents along one random direction; the child takes the first ones
+    # of one parent and the rest of the other.
     angle = rng.uniform(0.0, 2.0 * pi)
 
     def along(cell: Element) -> float:
@@ -91,6 +93,7 @@ def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
     """Return as many modules or pieces as the first layout has, drawn from those of both."""
+    # Sorted first, so that the draw does not depend on the order of a set.
     both = sorted({*first, *second})
     chosen = rng.choice(len(both), size=min(len(first), len(both)), replace=False)
     return tuple(both[index] for index in sorted(chosen))
@@ -115,6 +118,7 @@ class MoveMutation(Mutation):
 
     def _changed(self, actions: BoolArray, rng: np.random.Generator) -> Layout:
         scenario = self._moves.scenario
+        # Crossover may leave an illegal layout, and moves need a legal one.
         layout = repaired(scenario, layout_of(scenario, actions), rng)
         layout = self._moves.neighbour(layout, rng)
         while rng.random() < self._more:
@@ -149,6 +153,7 @@ def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> La
     try:
         return LayoutState.of(scenario, layout).layout
     except LayoutError:
+        # Greedy in random order: no end of the build zone is favoured.
         order = rng.permutation(len(layout))
         return legal_part(scenario, [layout[index] for index in order]).layout
 
@@ -189,6 +194,7 @@ def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> No
     scenario = session.problem.scenario
     count = objectives([]).shape[1]
     problem = Problem(n_var=scenario.zone.catalogue.finish, n_obj=count, vtype=bool)
+    # Ask and tell: the session counts the blasts and ends the run, not pymoo.
     algorithm.setup(problem, termination=NoTermination(), seed=session.seed)
     while True:
         population = algorithm.ask()
