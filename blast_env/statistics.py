@@ -68,6 +68,8 @@ def holm_adjusted(p_values: Sequence[float]) -> list[float]:
     Holm, A simple sequentially rejective multiple test procedure, Scand. J. Statist. 6 (1979) 65:
     the k-th smallest of m is multiplied by m - k + 1, and none is below a smaller one's.
     """
+    # (1) Sort; (2) the smallest of m counts m times, the next m - 1 times, ...; (3) monotone from
+    # small to large; (4) back in the given order, at most 1.
     order = np.argsort(p_values)
     factors = np.arange(len(order), 0, -1)
     adjusted = np.empty(len(order))
@@ -95,6 +97,8 @@ def stratified_estimate(groups: Sequence[tuple[float, Sequence[float]]]) -> Esti
         return Estimate(value, np.nan, np.nan)
     from scipy.special import stdtrit  # as in `_half_width`
 
+    # Groups are independent: variances of weighted means add up, and degrees of freedom too. A
+    # group of one value has no spread to contribute.
     variance = sum(w**2 * float(values.var(ddof=1)) / len(values) for w, values in several)
     half_width = float(stdtrit(freedom, 0.975) * np.sqrt(variance))
     return Estimate(value, value - half_width, value + half_width)
@@ -135,6 +139,7 @@ def reduction_estimate(impulse: FloatArray, unprotected: FloatArray) -> Estimate
     mean = float(unprotected.mean())
     if not mean > 0.0:
         return Estimate(np.nan, np.nan, np.nan)
+    # Delta method: the spread of a ratio of means a / b is that of a - (a / b) b, over b.
     ratio = float(impulse.mean()) / mean
     half_width = _half_width(impulse - ratio * unprotected) / mean
     reduction = 1.0 - ratio
@@ -156,6 +161,7 @@ def conditional_value_at_risk(values: FloatArray, level: float) -> float:
         BlastEnvError: If the level is out of bounds.
     """
     check_cvar_level(level)
+    # Whole values first, then the part of the next one that is left of the share 1 - level.
     worst_first = np.sort(values)[::-1]
     tail = (1.0 - level) * len(values)
     weight = np.clip(tail - np.arange(len(values)), 0.0, 1.0)
@@ -175,6 +181,7 @@ def _half_width(deviation: FloatArray) -> float:
         return np.nan
     from scipy.special import stdtrit  # Student's t; takes a fifth of a second to import
 
+    # Deviations from a known mean: Bessel's correction for its estimate.
     standard_error = np.sqrt(float(deviation @ deviation) / (count - 1) / count)
     return float(stdtrit(count - 1, 0.975) * standard_error)
 

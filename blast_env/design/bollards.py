@@ -97,6 +97,9 @@ def _line_on(very: _ById) -> LayoutState:
         raise BlastEnvError(
             f"{scenario.name} has no vehicle (a source of kind 'vehicle'): no line of posts to set"
         )
+    # Branch and bound over lines and items: (1) close the line with the fewest posts; (2) bound its
+    # distance from above, as if ratings held at any speed, which takes no search for speeds; (3)
+    # only if that beats the best so far, the true distance; (4) drop posts without effect.
     vehicles = _Vehicles(scenario)
     best = LayoutState.empty(scenario)
     farthest = vehicles.farthest(best)
@@ -180,6 +183,7 @@ class _Vehicles:
             own = np.zeros_like(closed)
             for rectangle in self.scenario.vehicle_ground(source).closed_m:
                 own[self._squares(rectangle)] = True
+            # Closed to every vehicle: a line must stop the one that it stops least.
             closed &= own
         return closed
 
@@ -210,6 +214,8 @@ class _Vehicles:
             post = self._along(item, run)
             end = 0  # of the closed part of the run
             for index in self._closed_along(run, placement):
+                # Greedy from one end, as far apart as the narrowest vehicle allows, which needs the
+                # fewest posts; where the farthest place is not legal, the next nearer one.
                 while index - end >= self.width - _TOLERANCE:
                     latest = min(ceil(end + self.width - _TOLERANCE) - 1, index - post.length)
                     tried = range(latest, end - 1, -1)

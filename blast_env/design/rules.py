@@ -142,6 +142,9 @@ def wall_added_to(
     """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
+    # (1) The preferred variants with a place between charge and structures; (2) the depth of the
+    # wall by the first of them; (3) both ends grow, the one nearer to the line of sight first; (4)
+    # the next variant goes on where the stock of one is used up.
     view = _View.of(placement, charge_m)
     variants = _preferred(placement, view.lies_along, kind)
     variants = [number for number in variants if view.between[number].any()]
@@ -367,6 +370,8 @@ class _View:
     def of(cls, placement: LayoutState, charge_m: PointM) -> "_View":
         scenario = placement.scenario
         x_m, y_m = scenario.zone.centres_m
+        # Coordinates along the line of sight (depth) and across it (aside), of the centres of
+        # cells, then of pieces by the offset from their lower left cell.
         along_x, along_y, _ = _line_of_sight(scenario, charge_m)
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
         between = placement.usable & _between(scenario, charge_m)
@@ -376,6 +381,7 @@ class _View:
         across_x, across_y = abs(along_y), abs(along_x)
         columns_m = MODULE_SIDE_M / 2.0 * np.array([variant.columns for variant in variants])
         rows_m = MODULE_SIDE_M / 2.0 * np.array([variant.rows for variant in variants])
+        # The shadow of a rectangle across a direction: the sum of its sides' shadows.
         half_width_m = columns_m * across_x + rows_m * across_y
         return cls(
             depth_m=depth_m + (right_m * along_x + up_m * along_y),
@@ -387,6 +393,7 @@ class _View:
 
     def wall_depth_m(self, number: int, share: float) -> float:
         """Return the depth of a wall of a variant, at a share of the available depths."""
+        # Depths at which a piece can stand on the line of sight, or as near to it as possible.
         from_line_m = np.where(self.between[number], np.abs(self.aside_m[number]), np.inf)
         on_line = from_line_m <= from_line_m.min() + MODULE_SIDE_M / 2.0
         depths_m = self.depth_m[number][on_line]
@@ -408,6 +415,8 @@ class _View:
         # Rounded, so that values that differ only by rounding are equal.
         off_m = np.abs(self.depth_m[number] - wall_m).round(9)
         gap_m = np.abs(start_m - end.reach_m).round(9)
+        # A piece must lengthen the wall by half a module, and may step off the axis by as much as
+        # it lengthens it and half a module: a bend of about 60 degrees at most.
         wider = gain_m >= _LEAST_GAIN_M
         steep = off_m > end.off_m + gain_m + _LEAST_GAIN_M
         possible = legal & self.between[number] & wider & ~steep
@@ -454,6 +463,7 @@ def _between(scenario: Scenario, charge_m: PointM) -> BoolArray:
     between: BoolArray = (depth_m > 0.0) & (depth_m < distance_m)
     for structure in scenario.structures:
         if structure.protected:
+            # Cells whose line to the charge meets a protected structure lie in it or behind it.
             between &= ~structure.rectangle_m.intersects_segments(charge_m, x_m, y_m)
     return between
 
@@ -528,7 +538,9 @@ def _around(
             f"{placement.scenario.name}: a ring around {around.centre} cannot begin there"
         )
     from_x_m, from_y_m = x_m + right_m - middle_x_m, y_m + up_m - middle_y_m
+    # The argument of z conj(w) is the angle from w to z, without a branch at 180 degrees.
     turn_rad = np.abs(np.angle((from_x_m + 1j * from_y_m) * towards.conjugate())).round(9)
+    # Gaps along x and y between two rectangles; the larger one separates them.
     gap_x_m = np.abs(from_x_m) - half_right_m - (around.right - around.left) / 2.0
     gap_y_m = np.abs(from_y_m) - half_up_m - (around.top - around.bottom) / 2.0
     upright = gap_x_m >= gap_y_m  # at the west or east side, rather than the south or north one

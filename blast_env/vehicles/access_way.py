@@ -120,6 +120,10 @@ class _Chains:
     def of(cls, way: AccessWay, passable: BoolArray) -> "_Chains":
         from scipy.ndimage import label  # takes a third of a second to import
 
+        # Discrete duality: a way of the vehicle's squares exists if no chain of blocked positions,
+        # neighbours by side or corner, joins the two borders along the way. (1) Positions that a
+        # closed cell blocks; (2) a blocked row beyond either border; (3) label chains; (4) those of
+        # either border.
         width = way.width_cells
         closed = any_in_windows(counts_before(~_along_columns(way, passable)), width, width)
         bordered = np.ones((closed.shape[0] + 2, closed.shape[1]), dtype=bool)
@@ -134,6 +138,7 @@ class _Chains:
 
     def closed_by(self, size: tuple[int, int]) -> BoolArray:
         """Return the lower left cells at which a piece connects the chains (rows, columns)."""
+        # A piece closes the way where the positions that it blocks touch both chains.
         along = size if self.way.between == "left_right" else size[::-1]
         width = self.way.width_cells
         closing = _beside(self.below, width, *along) & _beside(self.above, width, *along)

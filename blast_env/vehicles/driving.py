@@ -204,6 +204,7 @@ class SpeedField:
 
         If the way loops to gain speed, the rest is a short way from there to the entry.
         """
+        # From the end backwards, each time to a state that explains the speed of the present one.
         _, rows, columns = self.run_up_m.shape
         seen: set[int] = set()
         following: int | None = state
@@ -236,6 +237,7 @@ class SpeedField:
             (int(arcs.of[arc, 0]), arcs.ends[arc], float(arcs.lengths[arc]), int(arc))
             for arc in into
         ]
+        # The same conditions as in `spread`, backwards: a step that could have given this speed.
         for one, step, length, arc in steps:
             x, y = column - int(step[0]), row - int(step[1])
             if not (0 <= x < columns and 0 <= y < rows):
@@ -252,11 +254,13 @@ class SpeedField:
                 if most_m < own_m:
                     continue
             return int((one * rows + y) * columns + x)
+        # No step did: the vehicle turned on the spot here, coming from its fastest direction.
         fastest = int(self.run_up_m[:, row, column].argmax())
         return None if fastest == number else (fastest * rows + row) * columns + column
 
     def _back_to_entry(self, row: int, column: int) -> Iterator[tuple[int, int]]:
         """Yield the open places on a shortest way from a place to an entry."""
+        # Breadth first, so the first entry met is a nearest one.
         came: dict[tuple[int, int], tuple[int, int] | None] = {(row, column): None}
         queue = deque(came)
         rows, columns = self.is_open.shape

@@ -68,6 +68,8 @@ class Arcs(NamedTuple):
         """Return the arcs without those wider than any speed up to that of a radius needs."""
         kept = np.ones(len(self.of), dtype=bool)
         same = (self.of[1:] == self.of[:-1]).all(axis=1)
+        # Arcs of a pair rise by radius: once one is wide enough for the speed, wider ones add
+        # nothing.
         kept[1:] = ~same | (self.radii[:-1] < radius)
         return self._only(kept)
 
@@ -75,6 +77,7 @@ class Arcs(NamedTuple):
         """Return one arc in `step` for each pair of directions, by falling radius."""
         number = np.arange(len(self.of))
         ends = np.append((self.of[1:] != self.of[:-1]).any(axis=1), True)
+        # The index of the widest arc of each pair, counted down from.
         last = np.minimum.accumulate(np.where(ends, number, len(number))[::-1])[::-1]
         return self._only((last - number) % step == 0)
 
@@ -142,6 +145,8 @@ def _between(
 ) -> Iterator[tuple[IntArray32, IntArray32, float]]:
     """Yield the tangents and radii of arcs between two directions, by rising radius."""
     lengths = hypot(*one), hypot(*other)
+    # An arc between two tangents of length t with the angle a between directions has the radius t /
+    # tan(a / 2); tangents are whole numbers of either step, so that ends are places.
     cosine = float(one @ other) / (lengths[0] * lengths[1])
     per_tangent = 1.0 / tan(acos(cosine) / 2.0)
     tangents = {index * length for index in range(1, 200) for length in lengths}
@@ -160,6 +165,8 @@ def _arc(before: IntArray32, after: IntArray32, radius: float) -> tuple[IntArray
     cross = float(one[0] * other[1] - one[1] * other[0])
     side, angle = np.sign(cross), acos(float(one @ other))
     tangent = radius * tan(angle / 2.0)
+    # (1) Where the arc leaves its first tangent; (2) the centre, beside it; (3) points on the arc,
+    # four per place; (4) points on what is left of the tangents; (5) each place once.
     start = before - tangent * one
     centre = start + radius * side * np.array([-one[1], one[0]])
     turned = np.linspace(0.0, side * angle, 4 * ceil(radius * angle) + 2)

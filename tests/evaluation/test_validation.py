@@ -14,7 +14,7 @@ from tests.gas_sites import WALL, glazed_hut, hut, site_document
 
 
 @pytest.mark.parametrize(
-    ("place", "validation", "reason"),
+    ("place", "status", "reason"),
     [
         ((3.0, 0.0, 12.0, True, False, False), "measured", "in sight"),
         ((3.0, 1.0, 12.0, True, False, False), "verified", "in the shade"),

@@ -58,8 +58,11 @@ class Plan:
         """
         most = len(problem.threats)
         if len({threat.charge for threat in problem.threats}) == 1:
+            # One charge: realisations average noise only, so the budget goes to layouts first.
             wanted = budget // LAYOUTS_PER_REALISATION
         else:
+            # Many charges: layouts and threats per layout both grow with the square root of the
+            # budget.
             wanted = round(CHARGES_PER_ROOT_BLAST * budget**0.5)
         threats = max(1, min(wanted, most, budget))
         if threats == most:
@@ -166,6 +169,7 @@ class SearchSession:
                 were assessed, or if too many assessments in a row needed no new blast.
         """
         count = self.plan.threats if threats is None else threats
+        # Sorted: layouts that differ in the order of pieces are one and the same.
         keys = [tuple(sorted(layout)) for layout in layouts]
         distinct = list(dict.fromkeys(keys))
         affordable = self._affordable(distinct, count)
@@ -179,6 +183,8 @@ class SearchSession:
 
         This identifies layouts that were lucky under the first threats.
         """
+        # Successive halving: each round doubles the threats for the layouts that the blasts pay
+        # for, in equal shares of the reserve per round, and drops the rest.
         count, most = self.plan.threats, len(self.problem.threats)
         candidates = self.ranked(count)
         while count < most:
@@ -195,6 +201,8 @@ class SearchSession:
 
         All threats are used if the remaining blasts suffice, otherwise as many as they pay for.
         """
+        # (1) The front with the threats met so far; (2) as many more threats as the reserve pays
+        # for it; (3) further fronts, peeled off one by one, while it lasts.
         met, most = self.plan.threats, len(self.problem.threats)
         left, rest = self._budget - self.blasts, self.ranked(met)
         front = self._front_of(rest, met)
@@ -241,6 +249,7 @@ class SearchSession:
         """Return the front of layouts ranked by load, in ascending order of price."""
         front: list[Layout] = []
         # Stable: among equal prices, the least load first.
+        # By rising price, a layout is on the front if its load is below all cheaper ones.
         for key in sorted(ranked, key=self.problem.price):
             load = self._load(key, threats)
             if not front or load < self._load(front[-1], threats):
@@ -255,6 +264,7 @@ class SearchSession:
 
     def _affordable(self, layouts: Sequence[Layout], threats: int) -> list[Layout]:
         """Return the first layouts, as many as the remaining blasts pay for under `threats`."""
+        # Blasts that several layouts share, such as those that differ in glass alone, count once.
         asked, affordable = set[tuple[Layout, int]](), list[Layout]()
         for key in layouts:
             asked |= self._new_blasts([key], threats)
