@@ -90,12 +90,14 @@ def explosion_fan(
         centre: The charge's centre, units.
         rng: Generator for the phase of the fan and the random part of the velocities.
     """
+    # Drawn in any case: the velocities after it do not depend on the option.
     drawn = rng.random()
     phase = drawn if parameters.fan_phase == "random" else 0.0
     index = np.arange(1, parameters.ball_count + 1)
     angle = 2.0 * np.pi * (index + phase) / parameters.ball_count
     direction = np.column_stack((np.cos(angle), np.sin(angle)))
     share = parameters.thermal_share
+    # Energies add up: (1 - share) of the kinetic energy is radial, share / 2 goes to each axis.
     random_part = np.sqrt(share / 2.0) * rng.normal(size=direction.shape)
     return Balls.of_one_kind(
         CollisionType.ExplosionBall,
@@ -137,9 +139,13 @@ def air_lattice(
     x = np.arange(site.left + drawn_x * spacing, site.right, spacing)
     y = np.arange(site.bottom + drawn_y * spacing, site.top, spacing)
     position = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    # Half of the free gap at most, so that neighbours never overlap.
     reach = parameters.jitter * max(0.0, spacing / 2.0 - radius)
     position = position + rng.uniform(-reach, reach, size=position.shape)
 
+    # (1) Clear of the border and the charge, all at once; (2) clear of obstacles, each on the part
+    # of the lattice around it: the cost goes with the area of obstacles, not with their number
+    # times the air.
     inner = site.grown(-radius)
     free = (
         (position[:, 0] > inner.left)

@@ -143,6 +143,8 @@ def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
         scene: The scene; its barrier does not count as a structure.
         within_s: The remaining time.
     """
+    # A bound that is cheap and never wrong: straight distance to the nearest structure against the
+    # farthest way that is left.
     distance = np.full(len(balls), np.inf)
     for outline in scene.structures:
         for box in () if outline.is_barrier else outline.boxes_m:

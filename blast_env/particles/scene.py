@@ -93,6 +93,7 @@ def build_scene(
         scenario.check_for_particles()
     _check_not_over_a_roof(scenario, base.charge)
     parameters = _parameters_for(scenario, base.charge)
+    # Separate streams for charge, fan and air: a barrier or another fan leaves the air as it is.
     _, fan_rng, air_rng = random_streams(seed)
     centre = in_units(base.charge.position_m)
     air = air_lattice(
@@ -137,6 +138,7 @@ def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
     x_m, y_m = charge.position_m
     place = PointSource.at(charge)
     for structure in scenario.structures:
+        # In plan a charge on a roof lies inside the building.
         away_m = min(distance_m(place, box) for box in structure.boxes_m)
         if away_m < scenario.charge_radius_m - TOLERANCE_M:
             message = (

@@ -77,6 +77,7 @@ class _Lattice:
 
     def free_faces(self) -> BoolArray:
         """Return whether no module of this lattice adjoins the faces (k, 4)."""
+        # West, east, south, north; the border of empty cells saves the bounds.
         column, row = self.cells
         solid = self.occupied
         beside = solid[column - 1, row], solid[column + 1, row]
@@ -97,6 +98,7 @@ def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
         return
     # Digits below 1e-9 units are rounding of the metres in a scenario file.
     offsets = np.round(np.mod(centres, MODULE_SIDE_UNITS), 9) % MODULE_SIDE_UNITS
+    # Modules that differ by whole modules share faces; others only touch, and keep theirs.
     for offset in np.unique(offsets @ (1.0, 1.0j)):  # much faster than by rows
         members = np.flatnonzero((offsets == (offset.real, offset.imag)).all(axis=1))
         own = centres[members]
@@ -230,6 +232,7 @@ class ModularObstacle:
 
     def __post_init__(self) -> None:
         """Create the parts."""
+        # A grid row by row, from the lower left corner.
         half = MODULE_SIDE_UNITS / 2.0
         self.parts = [
             ModularPart(

@@ -76,6 +76,9 @@ class Visibility:
             BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
+        # (1) Lines from all places in all directions; (2) where each first meets a protected
+        # structure, another structure, a terrace; (3) of those that no other structure stops, the
+        # cells that cut them; (4) with heights, three lines each, less those that a terrace stops.
         origin, direction, source_weight = _all_lines(scenario)
         protected_m, other_m = np.full((2, len(origin)), np.inf)
         weight, base_m, target_m = np.zeros((3, len(origin)))
@@ -175,6 +178,7 @@ def _places(source: AnySource) -> list[PointM]:
         return [source.position_m]
     if not isinstance(source, RectangleSource):
         return [place for ends_m in source.lines_m for place in _places_along(*ends_m)]
+    # Centres of equal parts: none of them on the edge of the source.
     side = round(PLACES**0.5)
     shares = [(index + 0.5) / side for index in range(side)]
     (left, bottom), (width, height) = source.corner_m, source.size_m
@@ -189,6 +193,8 @@ def _places_along(start_m: PointM, end_m: PointM) -> list[PointM]:
 
 def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) -> FloatArray:
     """Return the distance along each line to a rectangle, m (lines,); infinite if it misses."""
+    # Slab method: the line is within the rectangle from its last entry to its first exit. No
+    # direction is along an axis, so nothing is divided by 0.
     low = (np.array([rectangle.left, rectangle.bottom]) - origin) / direction
     high = (np.array([rectangle.right, rectangle.top]) - origin) / direction
     enter = np.minimum(low, high).max(axis=1)
@@ -209,6 +215,7 @@ def _cut(
     along_x, along_y = direction[:, :1], direction[:, 1:]
     along = (to_y * along_y)[:, :, np.newaxis] + (to_x * along_x)[:, np.newaxis, :]
     beside = (to_y * along_x)[:, :, np.newaxis] - (to_x * along_y)[:, np.newaxis, :]
+    # The shadow of a square across a line is its side times |cos| + |sin|, half to either side.
     half_width = MODULE_SIDE_M / 2.0 * np.abs(direction).sum(axis=1)
     cut: BoolArray = (
         (np.abs(beside) < half_width[:, np.newaxis, np.newaxis])

@@ -224,6 +224,8 @@ def spread_over_cells(
     Returns:
         The copies, cell by cell, and the number of the first copy of each cell (cells + 1,).
     """
+    # (1) The rectangle of cells that each surface, grown by the largest radius, overlaps; (2) as
+    # many copies of it as cells; (3) sorted by cell, so that the surfaces of a cell are one slice.
     rows, columns = shape
     low, high = _boxes(surfaces)
     first = np.floor((low - reach - _TOLERANCE - corner) / cell_units).astype(np.int64) + 1
@@ -251,6 +253,9 @@ def _joined_faces(
         The faces, whose modules are numbered from 0, and the modules in order along each face.
     """
     face, member = np.nonzero(free_faces.T)
+    # (1) Each free face with its line and its place along it; (2) sorted by direction, line and
+    # place; (3) a face begins where the one before does not adjoin; (4) one joined face per run. A
+    # ball that slides along a wall thus meets no seams between modules.
     is_x = face < 2
     across, along = np.where(is_x, centres[member].T, centres[member, ::-1].T)
     # Rounding of the metres in a scenario file must not decide which faces lie in one line.
@@ -276,6 +281,7 @@ def _free_corners(
     centres: NDArray[np.float64], covered_corners: NDArray[np.bool_]
 ) -> tuple[RecordArray, NDArray[np.int64]]:
     """Return the corners of modules beyond which no wall continues, and their modules."""
+    # A corner within a wall is none: the faces beside it are in one line.
     corner, member = np.nonzero(~covered_corners.T)
     corners = np.zeros(len(member), dtype=SURFACE)
     corners["kind"] = CORNER
@@ -357,6 +363,7 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
         if not structure.is_barrier
         for box in structure.boxes_m
     ]
+    # Only structures end a run that reaches none of them any more; the barrier does not count.
     targets = UNITS_PER_M * np.array(structures, dtype=np.float64).reshape(-1, 4)
     progress = np.zeros(1, dtype=PROGRESS)[0]
     cells = _cells(scene.site, rules)

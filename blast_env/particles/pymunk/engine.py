@@ -81,6 +81,7 @@ class StepGuard:
             self._go_on_resetting()
         if not len(contacts.ball_pairs):
             return
+        # A bound on each speed that only grows: no velocities are read until a bound says so.
         impulse = contacts.ball_impulse + kick * contacts.ball_first
         balls = contacts.ball_pairs
         np.add.at(self._speed_bound, balls, impulse[:, None] / mass[balls])
@@ -223,6 +224,9 @@ class PymunkRun:
         self._built.space.step(time_step_s)
         self.steps += 1
         self.time_s += time_step_s
+        # (1) The space's step, in which the callback decides on contacts with modules; (2) the
+        # bounds on speeds; (3) hits on modules; (4) the base impulse and shrinking of new pairs;
+        # (5) the 30 % of explosive balls at modules; (6) balls at the border go.
         contacts = self._reader.read_contacts()
         self._guard.watch(contacts, self._mass, self._contact.base_impulse)
         new_touches = self._record_touches(contacts)
@@ -245,6 +249,7 @@ class PymunkRun:
         body = self._built.ball_bodies[ball.index]
         x, y = body.position
         centre = x - module.x, y - module.y
+        # Where the ball came from decides which face of a wall it met.
         moved = body.velocity * self._stepped_s
         before = centre[0] - moved.x, centre[1] - moved.y
         contact = self._sides.meet(ball.index, module, centre, before)
@@ -289,6 +294,8 @@ class PymunkRun:
         if not self._touches:
             self._touching = frozenset()
             return []
+        # Sorted by ball and gap: of two modules touched at once the nearest one counts (section
+        # 2.8).
         nearest: dict[int, _Touch] = {}
         for touch in sorted(self._touches, key=lambda touch: touch[:3]):
             nearest.setdefault(touch.ball, touch)

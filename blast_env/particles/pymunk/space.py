@@ -128,6 +128,7 @@ def build_space(scene: Scene, obstacles: tuple[ModularObstacle, ...]) -> PymunkS
     """
     parameters = scene.parameters
     fastest = expected_fastest_units_per_s(scene.balls, parameters)
+    # The step is as long as the fastest ball needs for a share of the smallest radius.
     longest_step_s = parameters.stepping.longest_step_s
     space = pymunk.Space()
     space.iterations = parameters.stepping.solver_iterations
@@ -185,6 +186,7 @@ def _add_border(space: pymunk.Space, scene: Scene) -> pymunk.Body:
     """Add the four border lines, thickened outwards, so that their inner faces are the border."""
     body = pymunk.Body(body_type=pymunk.Body.STATIC)
     space.add(body)
+    # Thick lines: a fast ball cannot pass one within a step.
     outer = Border(scene.site.grown(_BORDER_THICKNESS_UNITS))
     for start, end in outer.lines():
         line = pymunk.Segment(body, start, end, _BORDER_THICKNESS_UNITS)
@@ -213,6 +215,7 @@ def _add_balls(built: PymunkSpace, scene: Scene) -> None:
         )
     ):
         of_kind = kinds[kind]
+        # The order of adding decides the order of solving, hence the last bits: the scene's order.
         body = pymunk.Body(mass, of_kind.inertia_factor * mass * radius**2)
         body.position = position
         body.velocity = velocity
@@ -296,6 +299,7 @@ class ContactReader:
         index = np.array(
             [*range(self._ball_count), *(self._ball_count + m for m in modules), self._border]
         )
+        # pymunk counts bodies through the process: ids are translated to indices by a sorted table.
         ids = np.array([body.id for body in bodies], dtype=np.uint64)
         order = np.argsort(ids)
         self._sorted_ids, self._index_of_sorted = ids[order], index[order]
@@ -326,6 +330,7 @@ class ContactReader:
         order = np.argsort(pair[:, 0] * (self._border + 1) + pair[:, 1], kind="stable")
         order = order[integers[order, 3] > 0]
         pair, floats = pair[order], floats[order]
+        # The part along the normal; friction has the rest.
         impulse = np.abs(floats[:, 0] * floats[:, 2] + floats[:, 1] * floats[:, 3])
         between_balls = pair[:, 1] < self._ball_count
         at_border = pair[:, 1] == self._border
