@@ -149,6 +149,9 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
+        # (1) A key per pair, equal for equal blasts; (2) what the store has; (3) run the rest, each
+        # blast kept as soon as it is done, so that an interruption loses only those under way; (4)
+        # back in the order of the pairs.
         asked, keys, layouts = self._asked(pairs, processes)
         stored = ((key, self.store.get(key, self.scenario)) for key in asked)
         found = {key: loads for key, loads in stored if loads is not None}
@@ -267,6 +270,7 @@ def _run(
     if not missing:
         return
     engine = next(iter(missing.values()))[0].engine
+    # Lots as large as the engine takes less time for than for their parts.
     keys, size = list(missing), engine.at_once
     lots = [keys[first : first + size] for first in range(0, len(keys), size)]
     work = [
@@ -354,6 +358,7 @@ class Evaluators:
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario; see `BlastEvaluator` for errors."""
+        # By identity first: a content hash takes longer than a guess of the surrogate.
         newest = next(reversed(self._kept.values()), None)
         if newest is not None and newest.scenario is scenario:
             return newest  # the usual case, without the time for a content hash

@@ -54,6 +54,8 @@ def load_factors(
     Distances are those from the charge and from the other one; the masses of the other one have a
     shape that broadcasts with them.
     """
+    # Hopkinson and Cranz's scaling by the curves: the impulse is peak times duration, so the
+    # duration takes what the peak leaves.
     old_m, old_kg, new_m, new_kg = np.broadcast_arrays(distance_m, charge.tnt_kg, other_m, other_kg)
     loads: tuple[Load, Load] = ("overpressure", "impulse")
     peaks, impulses = (
@@ -168,6 +170,8 @@ class LevelProbability:
             return {}
         found: dict[str, float] = {}
         for name, quantile in zip(_DRIVERS, self.quantiles.T, strict=True):
+            # First-order index: the variance of the class means over the whole variance, less what
+            # means of so few draws vary by chance.
             classes = np.array_split(reached[np.argsort(quantile)], _BINS)
             between = np.var([members.mean() for members in classes])
             chance = np.mean([members.var() / max(len(members) - 1, 1) for members in classes])
@@ -222,6 +226,8 @@ def level_probability(
 def _latin(draws: int, seed: int) -> FloatArray:
     """Return a Latin hypercube of quantiles (draws, 5)."""
     rng = generator(seed)
+    # Latin hypercube: each quantity has one draw in each of as many equal intervals, in random
+    # order.
     order = np.argsort(rng.random((draws, len(_DRIVERS))), axis=0)
     return (order + rng.uniform(1e-6, 1.0 - 1e-6, order.shape)) / draws
 
@@ -246,6 +252,10 @@ class _Component:
         """Lower the level of protection of each draw to that by the component (draws,)."""
         from scipy.special import ndtri  # a quarter of a second to import
 
+        # (1) Standard normal quantities; (2) the mass, within the range in which histories scale;
+        # (3) the error of peaks, log-normal: scatter and engine in squares, then the grid; (4)
+        # factors on peaks and durations; (5) the lowest level under the histories with and without
+        # suction.
         normal = np.clip(ndtri(quantiles), -4.0, 4.0)
         mass = 1.0 + uncertainty.mass / _OF_INTERVAL * normal[:, 0]
         mass = np.clip(mass, 1.0 / MASS_RANGE, MASS_RANGE)
@@ -285,6 +295,8 @@ class _Component:
 
 def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Component]:
     """Yield the components that can decide: of each kind, those with the largest numbers."""
+    # Draws move all components of a kind alike, so the worst few of it decide; which one is worst
+    # may differ between short and long loads, hence three orders.
     kinds: dict[object, list[_Component]] = {}
     for response in responses:
         facade = response.facade
