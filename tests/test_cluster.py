@@ -151,11 +151,11 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
         found = evaluator.loads_of_many(PAIRS, progress=kill_one)
     assert size == (2, 2)
     assert two.workers[0].wait() < 0
-    assert [_bits(each) for each in found] == [_bits(each) for each in alone]
+    assert [_bits(load) for load in found] == [_bits(load) for load in alone]
     assert shares == [pytest.approx((done + 1) / len(PAIRS)) for done in range(len(PAIRS))]
     assert evaluator.counts.blasts == len(PAIRS)
     again = BlastEvaluator(BALLISTIC_COURTYARD, "event", cache=tmp_path)
-    assert [_bits(each) for each in again.loads_of_many(PAIRS)] == [_bits(each) for each in alone]
+    assert [_bits(load) for load in again.loads_of_many(PAIRS)] == [_bits(load) for load in alone]
     assert again.counts.blasts == 0
 
 

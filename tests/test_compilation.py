@@ -34,7 +34,7 @@ def test_the_notice_comes_once_and_only_if_something_is_compiled(
             with compilation_notice("a doubling"):
                 assert twice(number) == 4
         twice(1j)  # outside
-    assert [each.message for each in caplog.records] == [
+    assert [record.message for record in caplog.records] == [
         "compiling a doubling, once per installation ..."
     ]
 

@@ -35,7 +35,7 @@ from tests.documentation.pages import (
     shell_blocks,
 )
 
-CODE = {page: [each for each in STEPS[page] if isinstance(each, Code)] for page in STEPS}
+CODE = {page: [step for step in STEPS[page] if isinstance(step, Code)] for page in STEPS}
 WITH_CODE = [page for page in CODE if CODE[page]]
 
 
@@ -109,11 +109,11 @@ def parse_command(words: tuple[str, ...], in_sentence: bool = False) -> None:
     parse(application, words[3:], in_sentence)
 
 
-OUR_COMMANDS = [each for each in COMMANDS if each.words[0] in OURS]
-LINES = {each.line for each in OUR_COMMANDS if not each.is_name}
+OUR_COMMANDS = [command for command in COMMANDS if command.words[0] in OURS]
+LINES = {our_command.line for our_command in OUR_COMMANDS if not our_command.is_name}
 
 
-@pytest.mark.parametrize("page", sorted({each.page for each in OUR_COMMANDS}))
+@pytest.mark.parametrize("page", sorted({our_command.page for our_command in OUR_COMMANDS}))
 def test_the_commands_of_a_page_parse(page: str) -> None:
     for command in OUR_COMMANDS:
         if command.page == page:
@@ -128,14 +128,14 @@ def test_what_runs_in_the_place_of_commands_parses() -> None:
 
 
 def test_exceptions_stand_for_commands_and_code_that_the_pages_show() -> None:
-    shown = {each.line for each in COMMANDS}
+    shown = {command.line for command in COMMANDS}
     assert {*exceptions.SMALLER, *exceptions.NOT_RUN} <= LINES
     assert {*exceptions.SERVERS} <= shown
-    blocks = {(each.page, each.number) for page in CODE for each in CODE[page]}
+    blocks = {(case.page, case.number) for page in CODE for case in CODE[page]}
     assert {*exceptions.CODE_NOT_RUN, *exceptions.CODE_SHORTENED} <= blocks
     assert {*exceptions.CODE_OF_THE_BUILD} <= {*WITH_CODE}
     assert {*exceptions.BACKGROUND} | {
-        page for each in exceptions.GIVEN for page in each.pages
+        page for block in exceptions.GIVEN for page in block.pages
     } <= {*STEPS}
 
 
@@ -160,10 +160,13 @@ def test_code_says_its_language_so_that_it_is_not_overlooked() -> None:
 
 
 def test_the_documentation_names_every_command_of_the_studies() -> None:
-    named = {each.words[2:4] for each in COMMANDS if each.words[0] == "python"}
+    named = {command.words[2:4] for command in COMMANDS if command.words[0] == "python"}
     for script in ("gas",):
         registered = importlib.import_module(_main_of(f"studies.{script}")).app.registered_commands
-        found = {each.name or each.callback.__name__.replace("_", "-") for each in registered}
+        found = {
+            registered_command.name or registered_command.callback.__name__.replace("_", "-")
+            for registered_command in registered
+        }
         documented = {words[-1] for words in named if words[0] == f"studies.{script}"}
         assert found <= documented
 

@@ -26,7 +26,7 @@ def test_no_name_value_or_key_is_longer_than_a_quoted_text(text: str) -> None:
 
 
 def test_a_single_word_needs_no_quotes() -> None:
-    assert [named(each) for each in ("A-WALL", "Wände", "2O$4", "east wing", "", "a" * 81)] == [
+    assert [named(case) for case in ("A-WALL", "Wände", "2O$4", "east wing", "", "a" * 81)] == [
         *("A-WALL", "Wände", "2O$4", "'east wing'", "''"),
         quoted("a" * 81),
     ]

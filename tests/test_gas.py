@@ -131,9 +131,9 @@ def test_a_load_that_nobody_waited_for_does_not_blame_the_end(yard: blast_env.Sc
     document["structures"][1]["corner_m"] = [22.0, 6.0]
     result = blast_env.simulate(blast_env.Scenario.from_document(document, "far"), engine="gas")
     assert not result.structures.set_index("structure")["known"]["shed"]
-    (note,) = [each for each in result.impulse("shed").notes if NOT_KNOWN in each]
+    (note,) = [note for note in result.impulse("shed").notes if NOT_KNOWN in note]
     assert note == f"{NOT_KNOWN}: take until='walls' to wait for it"
-    assert not any(NOT_KNOWN in each for each in result.impulse("hut").notes)
+    assert not any(NOT_KNOWN in note for note in result.impulse("hut").notes)
 
 
 def test_to_wait_for_all_walls_takes_longer_and_changes_no_load_before(

@@ -11,7 +11,7 @@ LEAST = 1e-6
 def test_a_segment_meets_a_rectangle_if_a_point_of_it_is_inside() -> None:
     """From corners of a grid on which many segments are level, touch a side, or are points."""
     starts = [(float(x), float(y)) for x in range(8) for y in range(6)]
-    x, y = (np.array(each, dtype=float) for each in zip(*starts, strict=True))
+    x, y = (np.array(case, dtype=float) for case in zip(*starts, strict=True))
     along = np.linspace(0.0, 1.0, 337)[:, np.newaxis]
     seen = set()
     for start in starts:

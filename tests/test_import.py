@@ -47,9 +47,9 @@ def test_type_checkers_see_the_same_names() -> None:
         alias.name
         for node in tree.body
         if isinstance(node, ast.If)
-        for each in node.body
-        if isinstance(each, ast.ImportFrom)
-        for alias in each.names
+        for statement in node.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
     }
     assert typed == set(blast_env.__all__) - {"bundled_scenarios"}
     assert typed <= set(dir(blast_env))

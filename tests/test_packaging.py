@@ -122,7 +122,7 @@ def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None
 def test_the_source_archive_has_what_its_tests_read() -> None:
     """Whoever packages it for a distribution builds and tests from the archive alone."""
     included = SdistBuilder(str(REPOSITORY)).recurse_included_files()
-    names = {str(each.distribution_path) for each in included}
+    names = {str(recurse_included_file.distribution_path) for recurse_included_file in included}
     for folder in ("blast_env", "agents", "scenarios", "scripts", "studies", "tests", "docs"):
         here = {str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / folder).rglob("*.*")}
         assert {name for name in here if "__pycache__" not in name} <= names

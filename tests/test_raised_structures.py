@@ -78,11 +78,11 @@ def test_a_passage_lets_the_blast_through_and_a_filled_one_is_a_wall() -> None:
     below = raised(0.0, 2.0, (4.5, 3.0), name="below")
     whole = raised(0.0, 4.0, (4.5, 1.0), name="whole", rows=12)
     open_site, passage, filled, wall = (
-        blast(*each, build_zone=None)
-        for each in ([], wall_with(over), wall_with(over, below), [whole])
+        blast(*case, build_zone=None)
+        for case in ([], wall_with(over), wall_with(over, below), [whole])
     )
     through = [
-        float(each.structures["impulse_pa_s"].iloc[0]) for each in (open_site, passage, wall)
+        float(case.structures["impulse_pa_s"].iloc[0]) for case in (open_site, passage, wall)
     ]
     assert through[0] > 1.1 * through[1] > 1.5 * through[2]
     # Cells have the owner that stands there, not that of their column; the gas is the same.
@@ -96,7 +96,7 @@ def test_a_passage_lets_the_blast_through_and_a_filled_one_is_a_wall() -> None:
 def test_a_base_of_0_changes_nothing() -> None:
     plain, said = site_document(), site_document()
     said["structures"][0]["base_m"] = 0.0
-    scenarios = [Scenario.from_document(each, "hut") for each in (plain, said)]
+    scenarios = [Scenario.from_document(case, "hut") for case in (plain, said)]
     assert scenarios[0].content_hash == scenarios[1].content_hash
     assert hut_with(CANOPY).content_hash != hut_with({**CANOPY, "base_m": 2.0}).content_hash
 
@@ -145,9 +145,9 @@ def test_vehicles_and_people_pass_below_what_is_high_enough() -> None:
         document["structures"] = [*document["structures"], over]
         return Scenario.from_document(document, "gate")
 
-    grounds = [each.vehicle_ground(vehicle_of(each)) for each in map(gate, (2.0, 1.5))]
-    assert [each.left for each in grounds[0].standing_m] == [10.0]  # the hut alone
-    below, before = (each.worst_places().stand_off_m for each in grounds)
+    grounds = [case.vehicle_ground(vehicle_of(case)) for case in map(gate, (2.0, 1.5))]
+    assert [rectangle.left for rectangle in grounds[0].standing_m] == [10.0]  # the hut alone
+    below, before = (ground.worst_places().stand_off_m for ground in grounds)
     assert (before, below) == (2.0, 1.0)
     zone = {"corner_m": (3.5, 2.0), "rows": 8, "columns": 4, "stock": 4, "height_m": 1.5}
     zone["access_way"] = {"width_m": 1.0, "between": "left_right"}
@@ -161,7 +161,7 @@ def test_bays_begin_where_the_structure_does() -> None:
     facade = {"wall": "brick_215", "storey_m": 2.0}
     document = raised(1.0, 5.0, (1.0, 2.5), protected=True, facade=facade)
     found = hut_with(document).bays_with(())
-    floors = sorted({(each.bay.floor_m, each.bay.top_m) for each in found})
+    floors = sorted({(bay.bay.floor_m, bay.bay.top_m) for bay in found})
     assert floors == [(1.0, 3.0), (3.0, 5.0)]
 
 
@@ -170,7 +170,7 @@ def test_pictures_draw_it_above_the_ground() -> None:
     hut, canopy = structure_features(scenario.structures)
     assert (hut.look.dashed, canopy.look.dashed) == (False, True)
     assert canopy.title == "protected structure above the ground"
-    solid = next(each for each in boxes(scenario, ()) if each.name == "canopy")
+    solid = next(box for box in boxes(scenario, ()) if box.name == "canopy")
     assert solid.centre_m[2] == pytest.approx(2.75)
     assert solid.size_m[2] == pytest.approx(0.5)
 
@@ -184,7 +184,9 @@ def test_an_import_keeps_what_a_map_says(tags: dict[str, Any], tmp_path: Path) -
         charge(5.0, 5.0),
     )
     scenario = import_site(path, ImportOptions(protect=("Hall",))).scenario
-    found = {each.name: (each.base_m, each.height_m) for each in scenario.structures}
+    found = {
+        structure.name: (structure.base_m, structure.height_m) for structure in scenario.structures
+    }
     assert sorted(found.values()) == [(0.0, 9.0), (3.0, 6.0)]
 
 
@@ -193,8 +195,8 @@ def test_surrogate_and_lines_of_sight_take_it_as_absent() -> None:
     plain, with_it = hut_with(), hut_with(between)
     charge_at, surrogate = Charge((2.0, 4.0), 5.0), packaged_surrogate()
     loads = [
-        surrogate.guess(site_of(each), [()], [charge_at]).loads(site_of(each)).item()
-        for each in (plain, with_it)
+        surrogate.guess(site_of(case), [()], [charge_at]).loads(site_of(case)).item()
+        for case in (plain, with_it)
     ]
     assert loads[0] == loads[1]
     assert Visibility.of(with_it).open_share == Visibility.of(plain).open_share == 1.0

@@ -181,7 +181,9 @@ def test_threads_change_nothing() -> None:
     again = blasts(12)
     with ThreadPoolExecutor(3) as pool:
         together = list(pool.map(Blast.run, [*again, again[3]]))
-    assert [result.digest for result in together[:-1]] == [each.run().digest for each in blasts(12)]
+    assert [result.digest for result in together[:-1]] == [
+        blast.run().digest for blast in blasts(12)
+    ]
     assert together[-1].digest == together[3].digest
     assert together[-1].obstacles is not together[3].obstacles
 

@@ -152,7 +152,7 @@ def test_pieces_are_pushed_by_what_their_sides_took(protected: GasResult) -> Non
 def test_modules_without_a_catalogue_stand_on_it_too() -> None:
     zone = {"corner_m": [4.0, 2.5], "rows": 14, "columns": 8, "stock": 9, "height_m": 1.5}
     for high_m, top_m in ((1.5, 2.5), (None, None)):
-        of_height = {key: each for key, each in zone.items() if key != "height_m" or high_m}
+        of_height = {key: value for key, value in zone.items() if key != "height_m" or high_m}
         site = build_site(terraced(build_zone=of_height), ((0, 0), (0, 4)))
         below, above = site.structures[-1].blocks
         assert (below.base_m, below.height_m) == (0.0, high_m)
@@ -232,10 +232,10 @@ def test_terraces_of_one_height_side_by_side_are_one() -> None:
 
 def test_a_terrace_of_any_outline_carries_what_lies_wholly_on_it() -> None:
     disc = column("mound", 6.0, 6.0, 4.0)
-    flat = {key: each for key, each in HALL.items() if key != "base_m"}
+    flat = {key: value for key, value in HALL.items() if key != "base_m"}
     scenario = terraced(structures=[flat, disc | {"height_m": 1.0, "carries": True}])
     ground = LayoutState.empty(scenario).ground_m
-    modules = sum(each.modules for each in scenario.structures if each.carries)
+    modules = sum(structure.modules for structure in scenario.structures if structure.carries)
     assert int(ground.sum()) == modules
 
 
@@ -265,7 +265,7 @@ def test_vehicles_stop_at_it_and_meet_nothing_on_it(rated: bool) -> None:
     scenario = Scenario.from_document(document, "gate")
     vehicle = vehicle_of(scenario)
     ground = scenario.vehicle_ground(vehicle)
-    assert strip["corner_m"][0] in [each.left for each in ground.standing_m]
+    assert strip["corner_m"][0] in [rectangle.left for rectangle in ground.standing_m]
     layout = tuple(Piece(row, 2, "post", False) for row in range(0, 12, 2))
     placed, drive = LayoutState.of(scenario, layout), vehicle_drive(scenario, vehicle, layout)
     assert placed.explain_vehicles() == LayoutState.empty(scenario).explain_vehicles()
@@ -304,7 +304,10 @@ def test_vehicles_stop_at_it_and_meet_nothing_on_it(rated: bool) -> None:
 def test_what_cannot_be_is_refused(
     structures: list[dict[str, Any]], changes: dict[str, Any], words: str
 ) -> None:
-    written = [{key: each[key] for key in each if each[key] is not None} for each in structures]
+    written = [
+        {key: structure[key] for key in structure if structure[key] is not None}
+        for structure in structures
+    ]
     with pytest.raises(ScenarioError, match=words):
         terraced(*written, **changes)
 
@@ -325,7 +328,7 @@ def test_a_charge_may_be_above_it() -> None:
 
 
 def test_particles_refuse_it() -> None:
-    flat = {key: each for key, each in HALL.items() if key != "base_m"} | {"corner_m": [2.0, 8.5]}
+    flat = {key: value for key, value in HALL.items() if key != "base_m"} | {"corner_m": [2.0, 8.5]}
     flat |= {"rows": 4, "columns": 4}
     scenario = terraced(structures=[flat, TERRACE])
     with pytest.raises(BlastEnvError, match=r"carries: is true, must be false for .*'gas' takes"):
@@ -336,15 +339,15 @@ def test_particles_refuse_it() -> None:
 
 
 def test_pictures_draw_what_stands_on_it_at_its_height() -> None:
-    features = {each.name: each for each in site_features(terraced(), WALL)}
+    features = {site_feature.name: site_feature for site_feature in site_features(terraced(), WALL)}
     podium, hall = features["podium"], features["hall"]
     assert podium.kind is Kinds.TERRACE
     assert podium.kind.level < Kinds.BUILD_ZONE.level  # which is drawn over it
     assert not hall.look.dashed
     assert hall.title == Kinds.PROTECTED_STRUCTURE.words
-    walls = [each for each in boxes(terraced(), WALL) if each.name == "wall"]
-    assert [each.centre_m[2] for each in walls] == [1.5, 1.5]
-    assert [each.size_m[2] for each in walls] == [1.0, 1.0]
+    walls = [box for box in boxes(terraced(), WALL) if box.name == "wall"]
+    assert [wall.centre_m[2] for wall in walls] == [1.5, 1.5]
+    assert [wall.size_m[2] for wall in walls] == [1.0, 1.0]
 
 
 def test_the_zone_is_cut_where_the_ground_changes_its_height() -> None:
@@ -383,7 +386,7 @@ def test_planes_show_tops_of_structures_and_heights_of_pieces() -> None:
     planes = env.step(catalogue.action(WALL[0]))[0]
     channels = GridObservation().channels_of(terraced())
     height, barrier = (
-        planes[channels.index(f"{each}_height")] for each in ("structure", "barrier")
+        planes[channels.index(f"{name}_height")] for name in ("structure", "barrier")
     )
     heights_m = [12.0 * height[row, column] for row, column in ((0, 0), (5, 13), (10, 20))]
     assert heights_m == pytest.approx([0.0, 1.0, 4.0], abs=0.05)
@@ -396,7 +399,10 @@ def test_what_is_exported_comes_back(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     export_layout(LayoutPlan(terraced(), WALL), path)
     again = import_site(path, ImportOptions(stock=6)).scenario
-    found = {(each.carries, each.base_m, each.height_m, each.rows) for each in again.structures}
+    found = {
+        (structure.carries, structure.base_m, structure.height_m, structure.rows)
+        for structure in again.structures
+    }
     assert found == {(True, 0.0, 1.0, 16), (False, 1.0, 4.0, 10)}
 
 
@@ -406,7 +412,10 @@ def test_a_map_says_what_is_a_terrace_in_the_words_of_the_format(said: Any, tmp_
     podium = outline(rectangle(16.0, -2.0, 14.0, 10.0), carries=said, height_m=1.0)
     topless = outline(rectangle(16.0, 12.0, 14.0, 4.0), carries=said)
     imported = import_site(written(tmp_path, hall, podium, topless, charge(5.0, 5.0)))
-    found = {(each.carries, each.base_m, each.height_m) for each in imported.scenario.structures}
+    found = {
+        (structure.carries, structure.base_m, structure.height_m)
+        for structure in imported.scenario.structures
+    }
     assert found == {(False, 1.0, 9.0), (True, 0.0, 1.0), (False, 0.0, 6.0)}
     words = "guessed: terraces without a height, on which nothing stands: 1 (features[2])"
     assert words in imported.notes
@@ -423,13 +432,13 @@ def test_a_building_on_it_is_imported_again_as_on_the_ground(tmp_path: Path) -> 
         scenario = terraced(structures=[*parts, *terraces])
         export_layout(LayoutPlan(scenario, ()), path)
         again = import_site(path, ImportOptions(stock=6)).scenario
-        own = [each for each in again.structures if each.protected]
-        assert {each.base_m for each in own} == {base_m}
-        assert len({each.building for each in own} - {None}) == 1
-        assert sum(each.weight for each in own) == pytest.approx(1.0)
-        modules = sum(each.modules for each in scenario.structures if each.protected)
-        assert sum(each.modules for each in own) == modules
-        found.append([each.boxes_m for each in own])
+        own = [structure for structure in again.structures if structure.protected]
+        assert {structure.base_m for structure in own} == {base_m}
+        assert len({structure.building for structure in own} - {None}) == 1
+        assert sum(structure.weight for structure in own) == pytest.approx(1.0)
+        modules = sum(structure.modules for structure in scenario.structures if structure.protected)
+        assert sum(structure.modules for structure in own) == modules
+        found.append([structure.boxes_m for structure in own])
     assert found[0] == found[1]
 
 
@@ -439,7 +448,7 @@ def test_lines_of_sight_go_over_it_or_stop_at_it() -> None:
     for high_m in (0.5, 1.0, 3.0):
         scenario = terraced(structures=[HALL | {"base_m": high_m}, TERRACE | {"height_m": high_m}])
         seen[high_m] = Visibility.of(scenario)
-    shares = [each.open_share for each in seen.values()]
+    shares = [case.open_share for case in seen.values()]
     assert shares == pytest.approx([1.0, 2.0 / 3.0, 0.0], abs=1e-9)
     # At the wall on the edge the others are 0.63 and 1.29 m above the terrace.
     wall = [(row, 4) for row in range(14)]

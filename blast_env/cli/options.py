@@ -173,7 +173,7 @@ def numbers(option: str, text: str, form: str) -> tuple[Any, ...]:
         found = tuple(plain_number(option, part) for part in text.split(","))
         if len(found) in counts:
             return found
-    words = " or ".join(_COUNTS[each] for each in counts)
+    words = " or ".join(_COUNTS[count] for count in counts)
     raise BlastEnvError(f"{option} is {text!r}, must be {words} numbers as {form}")
 
 
@@ -240,7 +240,7 @@ class GivenCharge:
         Fixed charges come in turn, each once before any repeats.
         """
         drawn = in_turn(scenario, draw_threats(scenario, range(draws)))
-        fixed = (replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn)
+        fixed = (replace(draw, charge=self.fixed(scenario, draw.charge)) for draw in drawn)
         return one_of_each_charge(fixed)
 
     def drawn_by(
@@ -252,5 +252,5 @@ class GivenCharge:
         realisation: repeated ones are dropped.
         """
         drawn = in_turn(scenario, draw_threats(scenario, seeds))
-        threats = tuple(LoadCase(self.fixed(scenario, each.charge), each.seed) for each in drawn)
+        threats = tuple(LoadCase(self.fixed(scenario, draw.charge), draw.seed) for draw in drawn)
         return threats if engine.has_noise else one_of_each_charge(threats)

@@ -95,7 +95,7 @@ class Blasts:
 
     def values(self, name: str, number_of: NumberOf) -> FloatArray:
         """Return a number of the blasts with a layout (threats,)."""
-        return np.array([number_of(each) for each in self.records[name]])
+        return np.array([number_of(record) for record in self.records[name]])
 
     def loads(self, name: str) -> FloatArray:
         """Return the loads with a layout in the unit of the objective (threats,)."""
@@ -112,7 +112,7 @@ class Blasts:
         """
         objective = self.scenario.objective
         records = self.records[name or self.judged]
-        own = [Severity.of_loads(each.loads, objective) for each in records]
+        own = [Severity.of_loads(record.loads, objective) for record in records]
         return own.index(max(own))
 
     def under(self, numbers: Iterable[int]) -> "Blasts":

@@ -59,8 +59,8 @@ class Campaign:
         """
         found, store = find_scenario(site), BlastStore.of(cache)
         evaluators = (
-            None if each is None else BlastEvaluator(found, each, cache=store)
-            for each in (engine, coarser)
+            None if engine_used is None else BlastEvaluator(found, engine_used, cache=store)
+            for engine_used in (engine, coarser)
         )
         fine, other = evaluators
         assert fine is not None
@@ -73,12 +73,12 @@ class Campaign:
 
     def cost(self) -> tuple[CostGuess, ...]:
         """Return the estimated cost of each blast, of engines that can tell; nothing is run."""
-        asked = [(self.evaluator.engine, each.charge) for each in self.case.threats]
+        asked = [(self.evaluator.engine, threat.charge) for threat in self.case.threats]
         if self.coarser is not None:
             asked.append((self.coarser.engine, self.case.threats[0].charge))
         known = {pair: pair[0].cost(self.scenario, pair[1]) for pair in dict.fromkeys(asked)}
         costs = [known[pair] for pair in asked for _ in self.layouts]
-        return tuple(each for each in costs if each is not None)
+        return tuple(cost for cost in costs if cost is not None)
 
     def run(
         self,
@@ -120,8 +120,8 @@ class Campaign:
         known: dict[str, list[BlastRecord]] = {name: [] for name in self.layouts}
         threats = []
         for threat in self.case.threats:
-            found = [self.evaluator.known(each, threat) for each in self.layouts.values()]
-            records = [each for each in found if each is not None]
+            found = [self.evaluator.known(layout, threat) for layout in self.layouts.values()]
+            records = [item for item in found if item is not None]
             if len(records) == len(found):
                 threats.append(threat)
                 for own, record in zip(known.values(), records, strict=True):
@@ -145,7 +145,7 @@ class Campaign:
         there = LoadCase(threat.charge_against(self.scenario, layout), threat.seed)
         while falling := _falling(self.scenario, layout, record):
             fallen += falling
-            layout = tuple(each for each in layout if each not in fallen)
+            layout = tuple(element for element in layout if element not in fallen)
             (record,) = self.evaluator.records_of_many([(layout, there)])
         return replace(record, taken_away=fallen)
 
@@ -157,9 +157,9 @@ def _falling(scenario: Scenario, layout: Layout, record: BlastRecord) -> Layout:
     zone = scenario.zone
     # A blast has its pieces in order, whatever the order in the layout.
     ordered = sorted(load_relevant(layout))
-    bodies = [each for each in ordered if zone.rigid_piece(each) is not None]
+    bodies = [element for element in ordered if zone.rigid_piece(element) is not None]
     falls = record.pieces["falls_in_blast"].tolist()
-    return tuple(each for each, is_falling in zip(bodies, falls, strict=True) if is_falling)
+    return tuple(body for body, is_falling in zip(bodies, falls, strict=True) if is_falling)
 
 
 def blasts_of(
@@ -177,33 +177,37 @@ def _blasts_of(
     drawing: BlastDrawing | None,
 ) -> Iterator[Blasts]:
     done = 0
-    for _, group in groupby(campaigns, lambda each: (id(each.scenario), id(each.evaluator.engine))):
+    for _, group in groupby(
+        campaigns, lambda request: (id(request.scenario), id(request.evaluator.engine))
+    ):
         together = list(group)
-        for each in together:
-            check_distinct(each.case.threats)
+        for request in together:
+            check_distinct(request.case.threats)
         pairs = [
             (layout, threat)
-            for each in together
-            for threat in each.case.threats
-            for layout in each.layouts.values()
+            for request in together
+            for threat in request.case.threats
+            for layout in request.layouts.values()
         ]
         part = share_of(progress, done, len(campaigns), len(together))
         first = together[0]
         records = iter(first.evaluator.records_of_many(pairs, first.processes, part, drawing))
-        for each in together:
-            own: dict[str, list[BlastRecord]] = {name: [] for name in each.layouts}
-            for threat in each.case.threats:
+        for request in together:
+            own: dict[str, list[BlastRecord]] = {name: [] for name in request.layouts}
+            for threat in request.case.threats:
                 for (name, layout), record in zip(
-                    each.layouts.items(), islice(records, len(each.layouts)), strict=True
+                    request.layouts.items(), islice(records, len(request.layouts)), strict=True
                 ):
                     last = (
-                        each._after_falls(layout, threat, record) if each.without_fallen else record
+                        request._after_falls(layout, threat, record)
+                        if request.without_fallen
+                        else record
                     )
                     own[name].append(last)
             yield Blasts(
-                each.case,
-                each.layouts,
+                request.case,
+                request.layouts,
                 {name: tuple(found) for name, found in own.items()},
-                each.evaluator.engine,
+                request.evaluator.engine,
             )
         done += len(together)

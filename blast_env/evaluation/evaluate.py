@@ -126,7 +126,7 @@ def compare(
     found = blasts_of(campaigns, progress)
     coarser = evaluators.coarser() if with_error else None
     if coarser is not None:
-        loads = [each.loads(each.judged).max() for each in found]
+        loads = [blast.loads(blast.judged).max() for blast in found]
         number = int(np.argmax(loads))
         campaign = replace(campaigns[number], coarser=coarser.of(cases[number].scenario))
         found[number] = campaign.with_coarse(found[number], found[number].worst())

@@ -139,7 +139,7 @@ def build_site(
         site_m=scenario.site.rectangle_m,
         charge=charge,
         structures=structures,
-        gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
+        gauges=tuple(Gauge(gauge.name, gauge.position_m) for gauge in scenario.gauges),
         air_height_m=scenario.air_height_m,
         build_zone=None if scenario.build_zone is None else _whole(scenario),
     )
@@ -161,8 +161,8 @@ def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[Struct
     zone = scenario.build_zone
     may_go = frozenset() if zone is None else zone.may_be_taken_away
     return tuple(
-        _outline(each, is_lasting=each.name not in may_go)
-        for each in scenario.structures_with(layout)
+        _outline(structure, is_lasting=structure.name not in may_go)
+        for structure in scenario.structures_with(layout)
     )
 
 
@@ -200,8 +200,8 @@ def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
         LayoutError: If the catalogue has no such item, or it cannot be turned.
     """
     zone, modules = scenario.zone, scenario.zone.modules(layout)
-    terraces = [each for each in scenario.structures if each.carries]
-    bases_m = [ground_below_m(terraces, zone.cell_rectangle_m(each.cell)) for each in modules]
+    terraces = [structure for structure in scenario.structures if structure.carries]
+    bases_m = [ground_below_m(terraces, zone.cell_rectangle_m(module.cell)) for module in modules]
     tops_m = [
         None if module.height_m is None else base_m + module.height_m
         for module, base_m in zip(modules, bases_m, strict=True)

@@ -139,9 +139,9 @@ class LayoutFile:
 
     def _text(self, path: str | Path) -> str:
         """Return the file as JSON, with all cells on one line, or one line per piece."""
-        pieces = [each for each in standing(self.layout) if isinstance(each, Piece)]
+        pieces = [element for element in standing(self.layout) if isinstance(element, Piece)]
         measures = {
-            key: [each.item for each in self.layout if type(each) is kind]
+            key: [element.item for element in self.layout if type(element) is kind]
             for key, kind in _MEASURES.items()
         }
         if pieces or any(measures.values()):
@@ -164,7 +164,7 @@ class LayoutFile:
     def _mismatch(self, scenario: Scenario) -> str:
         """Return the message of a layout for another scenario, with a remedy."""
         hashes = (self.site_hash or "", scenario.site_hash)
-        saved, asked = (f"hash {each[:_HASH_DIGITS]}" for each in hashes)
+        saved, asked = (f"hash {item[:_HASH_DIGITS]}" for item in hashes)
         name = "a scenario without a name" if self.scenario is None else value_text(self.scenario)
         changed = ""
         if self.scenario == scenario.name:
@@ -285,7 +285,7 @@ def _pieces(listed: Any, source: str, place: str) -> Layout:
     """Return the pieces of a list; `place` is its key, for errors."""
     if not isinstance(listed, list):
         raise LayoutError(f"{source}: {place}: is {type_word(listed)}, must be a list of tables")
-    return tuple(_piece(each, f"{source}: {place}[{i}]") for i, each in enumerate(listed))
+    return tuple(_piece(name, f"{source}: {place}[{i}]") for i, name in enumerate(listed))
 
 
 def _piece(table: Any, where: str) -> Piece:

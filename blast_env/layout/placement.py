@@ -295,7 +295,7 @@ class LayoutState:
         catalogue, most = self.catalogue, self.stock_left
         if not catalogue.has_items:
             return (most,)
-        placed = Counter(each.item for each in self.layout if isinstance(each, Piece))
+        placed = Counter(element.item for element in self.layout if isinstance(element, Piece))
         each_left = zip(catalogue.stocks, catalogue.names, strict=True)
         return tuple(min(stock - placed[name], most) for stock, name in each_left)
 
@@ -305,7 +305,7 @@ class LayoutState:
         # Summed exactly, so that the order of the layout does not matter.
         costs = self._empty_zone.costs
         number = self.catalogue.variant_number
-        return fsum(costs[number(each), each[0], each[1]] for each in self.layout)
+        return fsum(costs[number(element), element[0], element[1]] for element in self.layout)
 
     @property
     def budget_left(self) -> float | None:
@@ -358,9 +358,9 @@ class LayoutState:
         zone, catalogue = self._zone, self.catalogue
         if not self.layout:
             return True
-        if any(catalogue.reason_against(each) is not None for each in self.layout):
+        if any(catalogue.reason_against(element) is not None for element in self.layout):
             return False
-        if any(isinstance(each, Measure) and each[:2] != (0, 0) for each in self.layout):
+        if any(isinstance(element, Measure) and element[:2] != (0, 0) for element in self.layout):
             return False
         if min(self.stock_left, *self.stocks_left) < 0 or len(set(self.cells)) < len(self.cells):
             return False
@@ -406,7 +406,9 @@ class LayoutState:
             return "is taken by a module" if element in self.layout else None
         for cell in self.catalogue.cells(element):
             if self._taken[cell]:
-                other = next(each for each in self.layout if cell in self.catalogue.cells(each))
+                other = next(
+                    element for element in self.layout if cell in self.catalogue.cells(element)
+                )
                 return _of_cell(element, cell, f"is taken by {element_text(other)}")
         return None
 
@@ -447,9 +449,9 @@ class LayoutState:
 def find_legal(placements: Iterable[LayoutState]) -> None:
     """Compute `LayoutState.legal` of placements, of those on one site in one array."""
     of_sites: dict[int, list[LayoutState]] = {}
-    for each in placements:
-        if "legal" not in vars(each):
-            of_sites.setdefault(id(each.scenario), []).append(each)
+    for item in placements:
+        if "legal" not in vars(item):
+            of_sites.setdefault(id(item.scenario), []).append(item)
     for own in of_sites.values():
         for placement, legal in zip(own, _legal_of(own), strict=True):
             vars(placement)["legal"] = legal
@@ -458,17 +460,17 @@ def find_legal(placements: Iterable[LayoutState]) -> None:
 def _legal_of(placements: Sequence[LayoutState]) -> BoolArray:
     """Return `LayoutState.legal` of states of one site (states, variants, rows, columns)."""
     cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
-    taken = np.array([each.occupancy for each in placements]) > 0
+    taken = np.array([placement.occupancy for placement in placements]) > 0
     legal = cells.places(cells.usable & ~taken)
     if placements[0]._zone.budget is not None:
-        spendable = np.array([each._spendable for each in placements])
+        spendable = np.array([placement._spendable for placement in placements])
         legal &= cells.costs <= spendable[:, np.newaxis, np.newaxis, np.newaxis]
-    left = np.array([each.stocks_left for each in placements])
-    of_variants = left[:, [each.item for each in catalogue.variants]]
+    left = np.array([placement.stocks_left for placement in placements])
+    of_variants = left[:, [variant.item for variant in catalogue.variants]]
     legal &= (of_variants > 0)[..., np.newaxis, np.newaxis]
-    for own, each in zip(legal, placements, strict=True):
-        if each._closing is not None:
-            own &= ~each._closing
+    for own, placement in zip(legal, placements, strict=True):
+        if placement._closing is not None:
+            own &= ~placement._closing
     legal.flags.writeable = False
     return legal
 
@@ -493,7 +495,7 @@ def _check_stock(placement: LayoutState, layout: Layout, element: Element) -> No
         what = "pieces"
         if placement.stock_left > 0:
             what = f"of {element.item!r}"
-            asked = sum(each.item == element.item for each in layout if isinstance(each, Piece))
+            asked = sum(piece.item == element.item for piece in layout if isinstance(piece, Piece))
             most = catalogue.stocks[catalogue.variant(element).item]
     if placement.stock_left == 0 or placement._reason_against_stock(element) is not None:
         raise LayoutError(

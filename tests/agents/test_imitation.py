@@ -81,7 +81,7 @@ def test_what_is_wanted_is_legal_at_every_moment_and_leads_to_the_layout(
         actions = np.flatnonzero(step.wanted).tolist()
         wanted_counts.add(len(actions) if actions != [finish] else 0)
         if actions != [finish]:
-            assert {scenario.zone.catalogue.element(each) for each in actions} <= set(layout)
+            assert {scenario.zone.catalogue.element(action) for action in actions} <= set(layout)
     full = LayoutState(scenario, layout).is_full
     assert wanted_counts == set(range(1 if full else 0, len(layout) + 1))
 
@@ -125,14 +125,14 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
     ordered = sorted(first_cases(scenario, 32), key=charge_y_m)
     cases = [ordered[0], ordered[-1]][:count]
     agent = agent_for(scenario, observation)
-    layouts = [by_rule(each) for each in cases]
-    shown = [Demonstration(*each, 0.4, observation) for each in zip(cases, layouts, strict=True)]
+    layouts = [by_rule(case) for case in cases]
+    shown = [Demonstration(*pair, 0.4, observation) for pair in zip(cases, layouts, strict=True)]
     chosen = warm(imitation_updates=300, learning_rate="lin_1e-2", batch_size=8)
     loss = imitate(agent.policy, shown, chosen, np.random.default_rng(0))
     assert loss < 0.8
-    for case, layout, each in zip(cases, layouts, shown, strict=True):
+    for case, layout, demonstration in zip(cases, layouts, shown, strict=True):
         assert sorted(agent.propose(scenario, case.charge)) == sorted(layout)
-        assert lead(agent.policy, each) > 0.5
+        assert lead(agent.policy, demonstration) > 0.5
 
 
 def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:
@@ -163,8 +163,8 @@ def test_the_best_by_rule_is_that_of_blasts_under_the_threats_of_the_case(threat
     evaluator = BlastEvaluator(scenario, "event")
     for case, (layout, reduction) in zip(cases, found, strict=True):
         loads = [
-            np.mean([evaluator.loads(each, t).protected_impulse_pa_s for t in case.threats])
-            for each in ((), layout, *layouts_by_rule(scenario, case.charge).values())
+            np.mean([evaluator.loads(item, t).protected_impulse_pa_s for t in case.threats])
+            for item in ((), layout, *layouts_by_rule(scenario, case.charge).values())
         ]
         assert loads[1] == min(loads)
         assert reduction == pytest.approx(1.0 - loads[1] / loads[0])

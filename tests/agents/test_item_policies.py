@@ -79,4 +79,4 @@ def test_an_agent_is_trained_on_pieces_and_proposes_them(tmp_path: Path) -> None
     assert agent.propose(scenario, CHARGE) == layout
     drawn = set(agent.sample(scenario, CHARGE, count=6, seed=1))
     assert len(drawn) > 1
-    assert all(LayoutState.of(scenario, each).layout == each for each in drawn)
+    assert all(LayoutState.of(scenario, draw).layout == draw for draw in drawn)

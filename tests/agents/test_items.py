@@ -71,7 +71,7 @@ def test_every_rule_gives_a_legal_layout_of_pieces(name: str) -> None:
 
 
 def test_without_a_catalogue_there_are_three_walls() -> None:
-    few, all_of_them = (proposers(ProposerKind.RULE, suiting=[each]) for each in (site(), yard()))
+    few, all_of_them = (proposers(ProposerKind.RULE, suiting=[case]) for case in (site(), yard()))
     walls = [f"wall_{place}" for place in ("near_charge", "in_middle", "near_building")]
     assert list(few) == [*walls, "sight_lines"]
     assert len(all_of_them) == 9
@@ -82,11 +82,13 @@ def test_walls_lie_across_the_line_of_sight() -> None:
     """Turned where the charge is in the west, not turned where it is in the south."""
     for rule in (wall_near_charge, wall_near_building):
         layout = rule(yard(), CHARGE)
-        assert [each for each in layout if isinstance(each, Piece) and each.turned] == [*layout]
+        assert [element for element in layout if isinstance(element, Piece) and element.turned] == [
+            *layout
+        ]
         rows = sorted(row for row, _ in LayoutState.of(yard(), layout).cells)
         assert rows == list(range(rows[0], rows[0] + 9))
     south = line_of_sight_wall(yard(), Charge((9.0, 0.7), 5.0), 0.0)
-    assert not any(isinstance(each, Piece) and each.turned for each in south)
+    assert not any(isinstance(variant, Piece) and variant.turned for variant in south)
 
 
 def test_high_walls_take_the_highest_item_and_long_ones_the_cheapest_length() -> None:
@@ -101,14 +103,14 @@ def test_high_walls_take_the_highest_item_and_long_ones_the_cheapest_length() ->
     high, long = (line_of_sight_wall(scenario, CHARGE, 0.0, kind) for kind in ("high", "long"))
     assert set(heights_m(scenario, high)) == {3.0}
     assert heights_m(scenario, long).count(1.0) >= 12
-    assert "post" not in {each.item for each in (*high, *long) if isinstance(each, Piece)}
+    assert "post" not in {piece.item for piece in (*high, *long) if isinstance(piece, Piece)}
 
 
 def test_what_is_left_goes_into_the_next_item() -> None:
     """Two of the dear walls, then baskets for what is left of the budget."""
     scenario = yard(items=[{**ITEMS[0], "stock": 2}, *ITEMS[1:]])
     layout = line_of_sight_wall(scenario, CHARGE, 0.0, "high")
-    items = [each.item for each in layout if isinstance(each, Piece)]
+    items = [element.item for element in layout if isinstance(element, Piece)]
     assert items == ["wall", "wall", "basket", "basket"]
 
 
@@ -123,12 +125,12 @@ def test_a_ring_bends_around_the_building() -> None:
         budget=None,
     )
     layout = ring_around_building(scenario, CHARGE)
-    turned = [each.turned for each in layout if isinstance(each, Piece)]
+    turned = [element.turned for element in layout if isinstance(element, Piece)]
     assert turned[:2] == [True, True]
     assert turned.count(False) >= 2
     hut = scenario.structures[0].rectangle_m
-    for each in layout:
-        left, bottom, right, top = scenario.zone.element_rectangle_m(each)
+    for element in layout:
+        left, bottom, right, top = scenario.zone.element_rectangle_m(element)
         gap_m = max(left - hut.right, hut.left - right, bottom - hut.top, hut.bottom - top)
         assert 0.5 <= gap_m < 1.0
 
@@ -136,8 +138,10 @@ def test_a_ring_bends_around_the_building() -> None:
 def test_a_ring_of_single_modules_stands_around_the_charge() -> None:
     scenario = site(charge_m=(20.0, 20.0), stock=12)
     layout = ring_around_charge(scenario, scenario.sample_charge(RNG()))
-    rectangles = [scenario.zone.element_rectangle_m(each) for each in layout]
-    away_m = [max(abs(x - 20.0), abs(y - 20.0)) for x, y in (each.centre for each in rectangles)]
+    rectangles = [scenario.zone.element_rectangle_m(element) for element in layout]
+    away_m = [
+        max(abs(x - 20.0), abs(y - 20.0)) for x, y in (rectangle.centre for rectangle in rectangles)
+    ]
     assert len(away_m) == 12
     assert max(away_m) - min(away_m) < 0.5
 
@@ -165,10 +169,10 @@ def test_draws_and_neighbours_are_legal(name: str, seed: int) -> None:
 def test_random_layouts_draw_every_item_and_orientation() -> None:
     rng = RNG()
     drawn = {
-        (each.item, each.turned)
+        (variant.item, variant.turned)
         for _ in range(20)
-        for each in random_layout(yard(), rng)
-        if isinstance(each, Piece)
+        for variant in random_layout(yard(), rng)
+        if isinstance(variant, Piece)
     }
     assert drawn == {("wall", False), ("wall", True), ("basket", False), ("post", False)}
 
@@ -205,7 +209,7 @@ def test_a_dear_piece_becomes_several_cheap_ones_and_back() -> None:
     kinds = set()
     for _ in range(400):
         layout = moves.neighbour(layout, rng)
-        kinds.add(tuple(sorted(each.item for each in layout if isinstance(each, Piece))))
+        kinds.add(tuple(sorted(element.item for element in layout if isinstance(element, Piece))))
     assert {("high", "high"), ("low",) * 4, ("high", "low", "low")} <= kinds
 
 
@@ -243,7 +247,7 @@ def problem() -> DesignProblem:
 def test_searches_find_layouts_of_pieces(problem: DesignProblem, method: str) -> None:
     result = find_proposer(method).propose(problem, 60, 0)
     assert LayoutState.of(problem.scenario, result.layout).layout == result.layout
-    assert any(isinstance(each, Piece) and each.item == "wall" for each in result.layout)
+    assert any(isinstance(element, Piece) and element.item == "wall" for element in result.layout)
     assert result.blasts <= 60
     assert result.load is not None
     assert result.load < 0.8 * problem.load(())
@@ -252,10 +256,10 @@ def test_searches_find_layouts_of_pieces(problem: DesignProblem, method: str) ->
 
 def test_the_front_is_over_the_cost(problem: DesignProblem) -> None:
     result = find_proposer("nsga2").propose(problem, 80, 1)
-    costs = [each.cost for each in result.front]
+    costs = [candidate.cost for candidate in result.front]
     assert costs == sorted(set(costs))
     assert costs[0] == 0.0
     assert len(costs) >= 3
     assert result.front_table()["cost"].tolist() == costs
-    impulses = [each.load for each in result.front]
+    impulses = [candidate.load for candidate in result.front]
     assert impulses == sorted(impulses, reverse=True)

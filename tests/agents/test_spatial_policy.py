@@ -133,7 +133,9 @@ def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     """
     site = generate_site(seed)
     bare_site = site.model_copy(  # the features do not say what a neighbouring building hides
-        update={"structures": tuple(each for each in site.structures if each.protected)}
+        update={
+            "structures": tuple(structure for structure in site.structures if structure.protected)
+        }
     )
     zone = bare_site.zone
     planes = GridObservation().episode(Observable(bare_site, bare_site.charge))
@@ -150,7 +152,7 @@ def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:
     """More of a blast meets the facade from nearby: a wall before that place hides the more."""
     points = ((2.25, 10.25), (35.25, 10.25))  # 7.75 m before the house, and 3 times that behind it
     house, cells = block("house", 10.0, 8.0, 9, 4, protected=True), zone(5.0, 8.0, 9, 1, stock=9)
-    charges = [point(*each) for each in points]
+    charges = [point(*case) for case in points]
     scenario = site("two_sides", (40.0, 20.0), charges, house, build_zone=cells)
     wall = LayoutState.of(scenario, list(scenario.zone.cells()))
     episode = GridObservation().episode(Observable(scenario, scenario.charge))

@@ -179,7 +179,7 @@ def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Pa
         torch.allclose(second["policy"][name], values, atol=1e-9)
         for name, values in first["policy"].items()
     )
-    counts = [each["policy.optimizer"]["state"][0]["step"].item() for each in (first, second)]
+    counts = [case["policy.optimizer"]["state"][0]["step"].item() for case in (first, second)]
     assert counts[1] == 2 * counts[0] > 0  # updates of both trainings
 
 

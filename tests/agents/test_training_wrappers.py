@@ -41,7 +41,7 @@ def test_training_pays_the_reduction() -> None:
     env = EnvironmentMaker(configuration, scenario_source(small_scenario()), 0)()
     env.reset(seed=0)
     rewards = [env.step(np.int64(action)) for action in (3, 3, 5, 6)]
-    assert [float(each[1]) for each in rewards] == [0.0, 0.0, 0.0, rewards[-1][4]["reduction"]]
+    assert [float(reward[1]) for reward in rewards] == [0.0, 0.0, 0.0, rewards[-1][4]["reduction"]]
 
 
 def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> None:

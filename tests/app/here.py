@@ -9,7 +9,9 @@ from blast_env.app.jobs import Workers, do
 
 def rows_of(table: Table) -> list[SimpleNamespace]:
     """Return the rows by headers without units: `its_probability`."""
-    names = [each.partition(" (")[0].partition(":")[0].replace(" ", "_") for each in table.headers]
+    names = [
+        header.partition(" (")[0].partition(":")[0].replace(" ", "_") for header in table.headers
+    ]
     return [
         SimpleNamespace(**dict(zip(names, row, strict=True))) for row in table.cells(TYPOGRAPHIC)
     ]

@@ -36,7 +36,7 @@ def test_steps_are_about_those_of_a_blast() -> None:
 def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:
     scenario = load_scenario("courtyard")
     charge = threats_of(scenario)[0].charge
-    coarse, fine = (GasEngine(cell_m=each).cost(scenario, charge) for each in (0.5, 0.25))
+    coarse, fine = (GasEngine(cell_m=value).cost(scenario, charge) for value in (0.5, 0.25))
     assert 8.0 < fine.seconds / coarse.seconds < 16.0  # the skirt does not grow as much
     assert fine.memory_bytes > coarse.memory_bytes
 
@@ -85,7 +85,7 @@ def test_words() -> None:
     assert cost_words([cost]) == "a blast of gas: about 2 min on a busy core, 0.5 GB"
     assert "50 blasts of gas: about 83 min" in cost_words([cost] * 50)
     assert "nothing to run" in cost_words([])
-    assert [time_words(each) for each in (0.2, 7.1, 44.0, 600.0, 7200.0)] == [
+    assert [time_words(value) for value in (0.2, 7.1, 44.0, 600.0, 7200.0)] == [
         *("1 s", "8 s", "45 s", "10 min", "2.0 h")
     ]
 

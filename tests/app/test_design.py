@@ -95,7 +95,7 @@ def test_designs_are_listed_and_a_damaged_one_says_so(tmp_path: Path) -> None:
     work = WorkFolder(tmp_path)
     good, bad = work.create(hut(), "begin"), work.create(COURTYARD, "begin")
     (bad.path / "design.json").write_text('{"present"')
-    by_id = {each.design_id: each for each in work.designs()}
+    by_id = {design.design_id: design for design in work.designs()}
     assert by_id[good.design_id].title == "hut"
     assert "cannot be read" in by_id[bad.design_id].problem
     with pytest.raises(BlastEnvError, match="cannot be read"):
@@ -107,7 +107,7 @@ def test_a_design_that_was_never_finished_is_none(tmp_path: Path) -> None:
     work = WorkFolder(tmp_path)
     good, unfinished = work.create(hut(), "begin"), work.create(hut(), "begin")
     (unfinished.path / "design.json").unlink()
-    assert [each.design_id for each in work.designs()] == [good.design_id]
+    assert [design.design_id for design in work.designs()] == [good.design_id]
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"present": 3, "sites": []}'])
@@ -153,7 +153,9 @@ def test_a_build_zone_of_a_map_comes_before_one_around_what_is_protected(tmp_pat
     assert (zone.corner_m, zone.rows, zone.columns) == ((8.0, 4.0), 20, 8)
     document = json.loads(path.read_text())
     document["features"] = [
-        each for each in document["features"] if each["properties"].get("kind") != "build_zone"
+        feature
+        for feature in document["features"]
+        if feature["properties"].get("kind") != "build_zone"
     ]
     without = tmp_path / path.name
     without.write_text(json.dumps(document))

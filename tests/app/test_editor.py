@@ -67,7 +67,7 @@ def test_an_opened_design_has_its_engine_threats_and_view_again(tmp_path: Path) 
     points = [{**document["charge"][0], "position_m": [2.0, y]} for y in (2.0, 6.0)]
     created = work.create(hut(charge=points), "begin")
     session = Session.opened(created, work, Workers())
-    first, second = (each.name for each in threats_of(session.scenario))
+    first, second = (threat.name for threat in threats_of(session.scenario))
     assert session.engine.cell_m == 0.25
     session.cells, session.view = 0.5, "Results"
     for chosen in ((second,), (first,)):
@@ -101,16 +101,16 @@ def test_a_facade_is_that_of_the_whole_building(tmp_path: Path) -> None:
     facade = {"wall": "brick_215", "glazing": "window_annealed_6", "storeys": 1}
     facade |= {"pane_width_m": 0.6, "pane_height_m": 1.0}
     after = edits.with_values(site, thing, {"facade": facade})
-    assert [each.facade is not None for each in after.structures] == [True, True, False]
-    (width,) = (each for each in fields_of(after, thing) if each.key == "pane_width_m")
+    assert [structure.facade is not None for structure in after.structures] == [True, True, False]
+    (width,) = (field for field in fields_of(after, thing) if field.key == "pane_width_m")
     after = edits.with_values(after, thing, change_of(edits.section_of(after, thing), width, 0.8))
     with pytest.raises(ScenarioError, match="must fit") as caught:
         edits.with_values(after, thing, change_of(edits.section_of(after, thing), width, 1.5))
     assert len(caught.value.problems) > 1
     assert reason_of(caught.value).count("must fit") == 1  # one message on the page
-    panes = {(each.glazing.width_m, each.glazing.height_m) for each in after.bays if each.glazing}
+    panes = {(bay.glazing.width_m, bay.glazing.height_m) for bay in after.bays if bay.glazing}
     assert panes == {(0.8, 1.0)}
-    assert {each.bay.structure for each in after.bays} == {"west", "east"}
+    assert {bay.bay.structure for bay in after.bays} == {"west", "east"}
     labels = [words for thing, words in edits.things(after) if thing.kind is ThingKind.STRUCTURE]
     assert labels[:2] == ["Town Hall, protected", "Town Hall: east, protected"]
 
@@ -122,7 +122,7 @@ def test_a_side_of_a_building_has_components_of_its_own() -> None:
 
     def put(site: Scenario, typed: str | None) -> Scenario:
         (panels,) = (
-            each for each in fields_of(site, thing, "west") if each.side and each.key == "wall"
+            field for field in fields_of(site, thing, "west") if field.side and field.key == "wall"
         )
         section = edits.section_of(site, thing)
         after = edits.with_values(site, thing, change_of(section, panels, typed))
@@ -130,7 +130,7 @@ def test_a_side_of_a_building_has_components_of_its_own() -> None:
         return after
 
     def walls(site: Scenario) -> dict[str, str | None]:
-        return {each.bay.wall: each.wall for each in site.named_bays()}
+        return {bay.bay.wall: bay.wall for bay in site.named_bays()}
 
     assert set(walls(site).values()) == {"brick_215"}
     stronger = put(put(site, "concrete_150"), "concrete_200")
@@ -211,7 +211,7 @@ def test_tools_draw(editor: Editor) -> None:
     scenario = editor.session.scenario
     assert len(scenario.structures) == 2
     assert len(scenario.zone.keep_outs) == 3
-    assert [each.kind for each in scenario.charge] == ["segment", "point", "rectangle"]
+    assert [source.kind for source in scenario.charge] == ["segment", "point", "rectangle"]
     assert len(scenario.gauges) == 1
     assert scenario.zone.columns == 18
     assert len(editor.session.history.past) == 6
@@ -278,7 +278,7 @@ def test_the_plan_has_the_outline_of_a_polygon() -> None:
     scenario = hut(structures=[*site_document()["structures"], silo])
     svg = plan_svg(PixelView.of(scenario, 600, 450), scenario, (), None)
     line = "#{:02x}{:02x}{:02x}".format(*STRUCTURE)
-    (path,) = (each for each in re.findall("<path[^>]*>", svg) if f'stroke="{line}"' in each)
+    (path,) = (match for match in re.findall("<path[^>]*>", svg) if f'stroke="{line}"' in match)
     assert (path.count("M"), path.count("L")) == (1, 7)
 
 
@@ -293,11 +293,11 @@ def test_the_plan_shows_where_a_vehicle_gets_to() -> None:
 
 def test_solids_have_the_heights_of_the_site() -> None:
     scenario = hut()
-    solids = {each.name: each for each in boxes(scenario, WALL)}
+    solids = {box.name: box for box in boxes(scenario, WALL)}
     assert solids["hut"].size_m == (2.0, 2.0, 2.0)
     assert solids["hut"].opacity == 1.0
     assert all(box.centre_m[2] == 0.75 for name, box in solids.items() if name.startswith("cell"))
-    open_air = {each.name: each for each in boxes(load_scenario("courtyard"), ())}
+    open_air = {box.name: box for box in boxes(load_scenario("courtyard"), ())}
     assert open_air["building"].size_m[2] == 12.0
     assert open_air["building"].opacity < 1.0
 
@@ -311,7 +311,7 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
         "catalogue",
         lambda site: edits.with_values(site, SiteThing(ThingKind.ZONE), {"items": [CATALOGUE]}),
     )
-    assert [each.name for each in placing.palette(editor.scenario, ())] == ["t_wall"]
+    assert [placeable.name for placeable in placing.palette(editor.scenario, ())] == ["t_wall"]
     editor.choose(Tool.PLACE)
     stroke(editor, (13.2, 6.2))
     editor.turned = True
@@ -327,7 +327,7 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
     assert editor.session.design.layout[-1] == Piece(4, 6, "t_wall", False)
     kept = WorkFolder(tmp_path).open(editor.session.folder.design_id).load()
     assert kept == editor.session.history
-    solids = {each.name: each.size_m for each in boxes(editor.scenario, editor.layout)}
+    solids = {box.name: box.size_m for box in boxes(editor.scenario, editor.layout)}
     assert solids["t_wall"] in ((2.0, 0.5, 2.5), (0.5, 2.0, 2.5))
     editor.selected = SiteThing(ThingKind.ITEM)
     editor.delete()  # of a catalogue nothing is left, and single modules are placed again

@@ -70,7 +70,7 @@ def test_a_line_of_charges_moves_as_a_whole_and_ends_where_it_is_drawn_to() -> N
 )
 def test_what_is_drawn_can_be_taken_away_again(kind: ThingKind, start: Any, end: Any) -> None:
     after, thing = edits.added(COURTYARD, kind, start, end)
-    assert thing in {each for each, _ in edits.things(after)}
+    assert thing in {case for case, _ in edits.things(after)}
     assert after != COURTYARD
     assert edits.removed(after, thing) == COURTYARD
 

@@ -181,14 +181,14 @@ def test_a_link_may_be_followed() -> None:
 
 
 def test_every_answer_forbids_frames_and_foreign_parts() -> None:
-    for each in (
+    for case in (
         Browser().get("/"),
         Browser(known=False).get("/"),
         Browser(known=False).get(f"/?token={ENTRANCE.token}"),
         Browser().get("/", headers={"host": "evil.example"}),
         Browser().ask("PUT", "/"),
     ):
-        assert {name: each.headers[name] for name in HEADERS} == dict(HEADERS)
+        assert {name: case.headers[name] for name in HEADERS} == dict(HEADERS)
     policy = HEADERS["Content-Security-Policy"]
     assert "frame-ancestors 'none'" in policy
     assert "default-src 'none'" in policy

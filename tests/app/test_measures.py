@@ -95,14 +95,14 @@ def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Sess
     unprotected, own = blasted.shown(threat)
     assert own.key == unprotected.key
     assert [row.layout for row in verdict_rows(blasted)] == ["no barrier", own.name]
-    (without,), (with_glass,) = (blasted.judged(each, threat) for each in (unprotected, own))
+    (without,), (with_glass,) = (blasted.judged(load, threat) for load in (unprotected, own))
     assert number_of(with_glass.cells[2]) < number_of(without.cells[2])  # panes broken
     blasted.undo()
 
 
 def test_other_windows_need_no_blast_and_other_bays_do(blasted: Session) -> None:
     blasted.put("wall", blasted.design.with_layout(WALL))
-    house = next(each for each, _ in edits.things(blasted.scenario) if each.kind == "structure")
+    house = next(case for case, _ in edits.things(blasted.scenario) if case.kind == "structure")
     facade = {"bay_m": 1.0, "glazing": "window_laminated_6", "wall": "brick_215"}
     with pytest.raises(ScenarioError, match="must fit"):  # the catalogue's are larger
         edits.with_values(blasted.scenario, house, {"facade": facade})
@@ -134,8 +134,8 @@ def test_the_picture_of_the_damage_is_of_what_stands_there_now(
     assert picture("shed") is None
     drawn: list[str] = []
 
-    def draw(each: BuildingResponse) -> bytes:
-        drawn.append(each.facade.level_of_protection.label)
+    def draw(building_response: BuildingResponse) -> bytes:
+        drawn.append(building_response.facade.level_of_protection.label)
         return b""
 
     monkeypatch.setattr(session, "damage_png", draw)
@@ -149,16 +149,19 @@ def test_the_picture_of_the_damage_is_of_what_stands_there_now(
 def test_a_layout_over_the_budget_can_be_looked_at_but_not_reported(blasted: Session) -> None:
     blasted.put("wall", blasted.design.with_layout((*WALL, GLASS)))
     (threat,) = blasted.chosen_threats()
-    before = [each.key for each in blasted.shown(threat)]
+    before = [case.key for case in blasted.shown(threat)]
     blasted.harden("panels", taken=True)
     assert len(blasted.design.layout) == len(WALL) + 2
     words = placing.counted(blasted.scenario, blasted.design.layout)
     assert words.endswith("115 of 100 cost units: 15 over the budget")
-    assert [each.key for each in blasted.shown(threat)] == before  # no load depends on costs
+    assert [case.key for case in blasted.shown(threat)] == before  # no load depends on costs
     with pytest.raises(LayoutError, match="budget"):
         blasted.report(Path("a.html"))
     blasted.undo()
-    known = {each.name: each for each in placing.measures(blasted.scenario, blasted.design.layout)}
+    known = {
+        measure.name: measure
+        for measure in placing.measures(blasted.scenario, blasted.design.layout)
+    }
     assert known["glass"].is_taken
     assert not known["panels"].is_taken
     assert known["panels"].words == "reinforced concrete wall, 150 mm on all structures, west"
@@ -183,7 +186,7 @@ def test_a_switch_on_the_page_takes_a_measure(tmp_path: Path) -> None:
 
         def switch(words: str) -> Any:
             switches = user.find(kind=ui.switch).elements
-            return next(each for each in switches if getattr(each, "text", "") == words)
+            return next(switch for switch in switches if getattr(switch, "text", "") == words)
 
         switch("glass, 50 cost units").value = True
         assert session.design.layout == (GLASS,)

@@ -95,7 +95,7 @@ def choose(user: User, words: str) -> None:
 
 
 def texts_in(item: ui.element) -> list[Any]:
-    return [each for each in item.descendants() if hasattr(each, "text")]
+    return [descendant for descendant in item.descendants() if hasattr(descendant, "text")]
 
 
 async def upload(user: User, name: str, content: bytes, times: int = 1) -> None:
@@ -156,20 +156,20 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         def loads() -> ui.table:
             """Return the table of loads: there is one of verdicts as well."""
             tables = user.find(kind=ui.table).elements
-            return next(each for each in tables if "reduction" in labels(each))
+            return next(table for table in tables if "reduction" in labels(table))
 
         def labels(table: ui.table) -> list[str]:
-            return [each["label"] for each in table.columns]
+            return [column["label"] for column in table.columns]
 
         table = loads()
-        reduction, engine = (str(labels(table).index(each)) for each in ("reduction", "engine"))
+        reduction, engine = (str(labels(table).index(name)) for name in ("reduction", "engine"))
         assert [row["0"] for row in table.rows] == ["no barrier"] * 2 + ["A"] * 2
         assert all("%" in row[reduction] for row in table.rows[2:])
         assert {row[engine] for row in table.rows} == {"gas, cells of 0.5 m"}
         await user.open(f"/design/{session.folder.design_id}")  # a reload comes back to the results
         assert next(iter(user.find(kind=ui.tabs).elements)).value == "Results"
         selects = user.find(kind=ui.select).elements
-        (proposer,) = (each for each in selects if each.props["label"] == "by")
+        (proposer,) = (select for select in selects if select.props["label"] == "by")
         assert next(iter(proposer.options)) == offers.PACKAGED
         proposer.value = "wall_near_building"
         user.find(marker="propose").click()
@@ -220,7 +220,9 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
         assert "\N{PLUS-MINUS SIGN}" in str(getattr(label, "text", ""))
         await user.should_see("grid error, from the worst charge")
         pictures = next(
-            each for each in user.find(kind=ui.select).elements if each.props["label"] == "picture"
+            element
+            for element in user.find(kind=ui.select).elements
+            if element.props["label"] == "picture"
         )
         for picture in (
             "film",
@@ -241,12 +243,12 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
 
 def choose_thing(user: User, thing: str) -> None:
     selects = user.find(kind=ui.select).elements
-    next(each for each in selects if each.props["label"] == "selected").value = thing
+    next(select for select in selects if select.props["label"] == "selected").value = thing
 
 
 def field_of(user: User, label: str) -> NumberField:
     fields = user.find(kind=NumberField).elements
-    return next(each for each in fields if each.props["label"] == label)
+    return next(field for field in fields if field.props["label"] == label)
 
 
 def test_a_number_is_read_as_it_is_meant_or_refused(tmp_path: Path) -> None:
@@ -286,7 +288,9 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         assert session.scenario.structures[0].height_m == 3.5
         await user.should_see("greater than or equal to 0.5")
         windows = next(
-            each for each in user.find(kind=ui.select).elements if each.props["label"] == "windows"
+            element
+            for element in user.find(kind=ui.select).elements
+            if element.props["label"] == "windows"
         )
         windows.value = "window_annealed_6"
         facade = session.scenario.structures[0].facade
@@ -304,14 +308,14 @@ def test_panels_of_one_side_are_chosen_in_the_fields(tmp_path: Path) -> None:
 
         def select(label: str) -> ui.select:
             found = user.find(kind=ui.select).elements
-            return next(each for each in found if each.props.get("label") == label)
+            return next(element for element in found if element.props.get("label") == label)
 
         select("selected").value = "structure 0"
         select("windows and walls of").value = "west"
         select("wall panels, west side").value = "concrete_200"
         facade = session.scenario.structures[0].facade
         assert facade is not None
-        assert [(each.walls, each.wall) for each in facade.parts] == [(("west",), "concrete_200")]
+        assert [(part.walls, part.wall) for part in facade.parts] == [(("west",), "concrete_200")]
         select("windows and walls of").value = ""
         assert select("wall panels").value == facade.wall != "concrete_200"
 
@@ -330,16 +334,16 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
         await replace_site(user, path)
         await user.should_see("podium", retries=200)
         assert session.scenario == site
-        fields = {each.label: each for each in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
+        fields = {field.label: field for field in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
         for label in ("base height (m)", "terrace"):
             assert fields[label].hint
 
         def shown(kind: type[Any], label: str) -> Any:
             found = user.find(kind=kind).elements
             return next(
-                each
-                for each in found
-                if label in (each.props.get("label"), getattr(each, "text", ""))
+                element
+                for element in found
+                if label in (element.props.get("label"), getattr(element, "text", ""))
             )
 
         chooser = shown(ui.select, "selected")
@@ -432,8 +436,8 @@ def test_a_map_becomes_a_site_with_its_deviations_told(
         await user.should_see("of its outline")
         user.find(marker="take-site").click()
         assert session.scenario.georeference is not None
-        assert {each.tnt_kg for each in session.scenario.charge} == {50.5}
-        assert any(each.protected for each in session.scenario.structures)
+        assert {source.tnt_kg for source in session.scenario.charge} == {50.5}
+        assert any(structure.protected for structure in session.scenario.structures)
         assert (session.scenario.site.width_m, session.scenario.site.height_m) == (60.0, 50.0)
 
     play(tmp_path, story)
@@ -468,7 +472,7 @@ def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
         assert sessions.of(session.folder.design_id) is not session  # it is opened anew
 
     play(tmp_path, story)
-    assert not [each for each in caplog.records if each.levelno >= logging.WARNING]
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
 
 
 def test_not_all_files_are_read_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -514,7 +518,7 @@ def test_so_many_pages_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         session = sessions.new(hut(), "begin")
         address = f"/design/{session.folder.design_id}"
         answers = [await user.http_client.get(address) for _ in range(most + 2)]
-        assert [each.status_code for each in answers[-3:]] == [200, 503, 503]
+        assert [answer.status_code for answer in answers[-3:]] == [200, 503, 503]
         assert f"{most} pages are open, the most that may be is" in answers[-1].text
         assert len(Client.instances) == most
         next(iter(Client.instances.values())).delete()

@@ -58,7 +58,7 @@ def test_the_page_assesses_as_the_command_does(tmp_path: Path) -> None:
     assert status.text.startswith("hut, layout A: DOES NOT COMPLY")
     assert is_present
     session.put("no wall", session.design.with_layout(()))
-    assert [each for _, each in session.answers()] == [False]
+    assert [case for _, case in session.answers()] == [False]
 
 
 def test_advice_can_be_used(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_advice_can_be_used(tmp_path: Path) -> None:
     status = read_status(session.ask(Question.ADVISE, LOW, 0.1, 1))
     assert (status.state, status.text[:5]) == ("done", "Walls")
     ((answer, _),) = session.answers()
-    (table,) = (each for each in answer.document.parts if isinstance(each, Table))
+    (table,) = (part for part in answer.document.parts if isinstance(part, Table))
     assert [row[0] for row in table.rows] == ["nothing", "shield", "harden", "together"]
     session.take(status, 0)
     assert plain(session.design.layout) == status.layout
@@ -107,7 +107,7 @@ def test_the_answer_is_on_the_page_until_the_layout_changes(tmp_path: Path) -> N
         write_kept(answer, folder / ANSWER)
         await user.should_see("Up to which charge?")
         await user.should_see("complies")
-        rows = [row for each in user.find(kind=ui.table).elements for row in each.rows]
+        rows = [row for element in user.find(kind=ui.table).elements for row in element.rows]
         assert {"id": 0, "0": "A", "1": "12"} in rows
         await user.should_not_see("have changed since")
         session.put("wall", session.design.with_layout(WALL))

@@ -168,21 +168,21 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     record = read_kept(BlastPictures, gas.folder.blast_of(key) / PICTURES)
     assert record is not None
     loads = gas.results()["A"].records["A"][0].loads.structures
-    load = next(each for each in loads if each.name == "hut")
+    load = next(load for load in loads if load.name == "hut")
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s)
     assert load.peak_pa == pytest.approx(float(result.structures["peak_pa"].iloc[0]))
     folder = gas.folder.blast_of(key)
     with Image.open(folder / "film.webp") as film:
         assert getattr(film, "n_frames", 1) == blasts.FRAMES
-    assert {each.label for each in record.pictures} == {
+    assert {picture.label for picture in record.pictures} == {
         "film",
-        *(f"gauge {each.name}" for each in glazed_hut().gauges),
+        *(f"gauge {gauge.name}" for gauge in glazed_hut().gauges),
         "peak over the ground",
         "impulse over the ground",
         "peak on the walls of hut",
         "impulse on the walls of hut",
     }
-    assert all((folder / each.file).stat().st_size > 1000 for each in record.pictures)
+    assert all((folder / picture.file).stat().st_size > 1000 for picture in record.pictures)
     assert record.repeat["scenario hash"] == glazed_hut().content_hash
 
 
@@ -194,7 +194,7 @@ def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None
         ("A", threat.name, "hut"),
     ]
     found = consequences(BlastEvaluator(glazed_hut(), "gas"), WALL, [threat.charge])
-    (facade,) = (each.facade for each in found.of("hut"))
+    (facade,) = (response.facade for response in found.of("hut"))
     assert rows[1].level_of_protection == found.level_words("hut")
     assert rows[1].panes_broken == f"{facade.broken_panes:.1f} of {facade.panes}"
     assert rows[1].worst_pane == facade.worst_condition.words
@@ -232,16 +232,16 @@ def test_what_is_there_is_not_run_again(gas: Session) -> None:
 def test_of_many_sources_the_worst_are_blasted_unless_others_are_chosen() -> None:
     """Six charges at growing distances from the hut; all can be chosen."""
     places = [(5.5 - 0.5 * k, 4.0) for k in (3, 0, 5, 1, 4, 2)]
-    charges = [{"kind": "point", "position_m": [*each], "tnt_kg": 1.0} for each in places]
+    charges = [{"kind": "point", "position_m": [*place], "tnt_kg": 1.0} for place in places]
     site = hut(charge=charges)
-    named = {each.name: each.charge.position_m[0] for each in threats_of(site)}  # type: ignore[union-attr]
-    assert [named[each] for each in usual_threats(site)] == [4.0, 5.5, 5.0, 4.5]
+    named = {threat.name: threat.charge.position_m[0] for threat in threats_of(site)}  # type: ignore[union-attr]
+    assert [named[usual_threat] for usual_threat in usual_threats(site)] == [4.0, 5.5, 5.0, 4.5]
     assert len(named) == 6
 
 
 def test_keys_know_what_a_record_depends_on() -> None:
     charge = Charge((2.0, 4.0), 5.0)
-    assert [each.charge for each in threats_of(hut())] == [charge]
+    assert [threat.charge for threat in threats_of(hut())] == [charge]
 
     def key(
         site: Scenario, layout: Layout = WALL, charge: Charge = charge, **cells: Any
@@ -308,7 +308,7 @@ def test_a_blast_has_cells_that_grow(tmp_path: Path) -> None:
     assert state_of(session).state == "done", state_of(session).text
     (record,) = session.results()["no barrier"].records["no barrier"]
     result = GasBlast(session.scenario, (), 0, GasEngine(cells="coarse"), threat.charge).run()
-    load = next(each for each in record.loads.structures if each.name == "hut")
+    load = next(structure for structure in record.loads.structures if structure.name == "hut")
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s, rel=1e-6)
 
 
@@ -342,7 +342,7 @@ def test_of_several_threats_the_worst_one_gives_the_error(tmp_path: Path) -> Non
     session = Sessions(WorkFolder(tmp_path), Here()).new(
         Scenario.from_document(document, "line"), "begin"
     )
-    start, end = (each.name for each in threats_of(session.scenario)[1:])
+    start, end = (threat.name for threat in threats_of(session.scenario)[1:])
     session.threats = (start, end)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
@@ -381,13 +381,13 @@ def test_what_cannot_be_begun_is_refused_at_once(tmp_path: Path) -> None:
 
 def test_threats_have_places_that_one_can_point_to() -> None:
     courtyard = threats_of(load_scenario("courtyard"))
-    assert [each.name for each in courtyard] == [
+    assert [threat.name for threat in courtyard] == [
         "charge 1, middle",
         "charge 1, start",
         "charge 1, end",
     ]
     assert courtyard[1].charge == Charge((5.0, 6.0), 100.0)
-    assert [each.name for each in threats_of(hut())] == ["charge 1"]
+    assert [threat.name for threat in threats_of(hut())] == ["charge 1"]
 
 
 @pytest.mark.usefixtures("without_pictures")
@@ -593,7 +593,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     status = state_of(session)
     assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))
     assert status.text == "wrote r.html and r.pdf"
-    charges = tuple(each.charge for each in session.chosen_threats())
+    charges = tuple(threat.charge for threat in session.chosen_threats())
     options = StudyOptions(
         charges=charges,
         cells=(0.5, 0.5),

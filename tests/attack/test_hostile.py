@@ -245,7 +245,12 @@ def test_a_table_has_the_kinds_of_its_columns(
     pq.write_table(pa.table({column: values}), tmp_path / "a.parquet")
     with pytest.raises(BlastEnvError, match=f"a.parquet: {words}"):
         checked_table(
-            tmp_path / "a.parquet", [each for each in COLLISION_COLUMNS if each.name == column]
+            tmp_path / "a.parquet",
+            [
+                collision_column
+                for collision_column in COLLISION_COLUMNS
+                if collision_column.name == column
+            ],
         )
 
 
@@ -288,8 +293,8 @@ def test_messages_quote_little_of_a_long_text() -> None:
         LayoutFile((), long, "0" * 64).layout_for("courtyard")
     with pytest.raises(BlastEnvError) as crs:
         import_site(BLOCK, ImportOptions(crs=long))
-    for each in (layout, crs):
-        assert "x" * 81 not in str(each.value)
+    for case in (layout, crs):
+        assert "x" * 81 not in str(case.value)
 
 
 @pytest.mark.parametrize("name", ["os:system", "builtins:pow", "math:pi", "nothing:at_all"])

@@ -37,7 +37,7 @@ def damaged(draw: st.DrawFn, samples: tuple[bytes, ...]) -> bytes:
     """A sound file with tokens replaced, repeated or cut out, or without its end."""
     content = draw(st.sampled_from(samples))
     for _ in range(draw(st.integers(0, 3))):
-        places = [each.span() for each in TOKEN.finditer(content)] or [(0, len(content))]
+        places = [match.span() for match in TOKEN.finditer(content)] or [(0, len(content))]
         first, last = draw(st.sampled_from(places))
         another = content[slice(*draw(st.sampled_from(places)))]
         old = content[first:last]
@@ -46,7 +46,7 @@ def damaged(draw: st.DrawFn, samples: tuple[bytes, ...]) -> bytes:
     if draw(st.booleans()):
         return content
     place = draw(st.integers(0, max(len(content) - 1, 0)))
-    flipped = content[place : place + 1].translate(bytes(each ^ 1 for each in range(256)))
+    flipped = content[place : place + 1].translate(bytes(index ^ 1 for index in range(256)))
     return content[:place] + draw(st.sampled_from((b"", flipped + content[place + 1 :])))
 
 
@@ -62,12 +62,12 @@ def test_a_damaged_file_is_refused_or_read(form: Format, data: st.DataObject) ->
     with suppress(BlastEnvError):
         found = form.read(content)
         if form.has_checksum and found is not None:
-            assert found in [form.read(each) for each in form.samples]
+            assert found in [form.read(sample) for sample in form.samples]
 
 
 def test_a_sound_file_is_read(form: Format) -> None:
-    for each in form.samples:
-        assert form.read(each) is not None
+    for sample in form.samples:
+        assert form.read(sample) is not None
 
 
 # --- Files made on purpose to take long or much are refused at once.
@@ -116,7 +116,7 @@ def large_items() -> bytes:
 def facades(count: int) -> bytes:
     facade = "height_m = 2000.0\n[structures.facade]\nstorey_m = 2.0\nbay_m = 0.5\n"
     wide = (house(n, 1000.0, 10.0 + 15 * n).replace("s = 4", "s = 1000") for n in range(count))
-    return toml((f"{each}{facade}wall = 'brick_215'\n" for each in wide), 2000.0)
+    return toml((f"{case}{facade}wall = 'brick_215'\n" for case in wide), 2000.0)
 
 
 def driven(size: float) -> bytes:

@@ -26,6 +26,7 @@ class RowEngine(ShadeEngine):
         for element in layout:
             left *= 1.0 - 0.1 / (1.0 + abs(element[0] - self.row))
         structures = tuple(
-            replace(each, impulse_pa_s=left * each.impulse_pa_s) for each in unprotected.structures
+            replace(structure, impulse_pa_s=left * structure.impulse_pa_s)
+            for structure in unprotected.structures
         )
         return BlastLoads(structures, left * unprotected.module_impulse_n_s)

@@ -23,13 +23,13 @@ def rows() -> pd.DataFrame:
 
 
 def test_every_row_is_what_the_card_says(rows: pd.DataFrame) -> None:
-    assert list(rows.columns) == [each.name for each in COLUMNS]
+    assert list(rows.columns) == [column.name for column in COLUMNS]
     assert set(rows["table"]) == set(TABLES)
     assert len(rows) > 4_000
     assert set(rows["split"]) == {"train", "validation", "test"}
     assert (rows.groupby("scenario_hash")["split"].nunique() == 1).all()
     assert (rows[["impulse_pa_s", "peak_pa", "tnt_kg"]] > 0.0).to_numpy().all()
-    assert all(isinstance(json.loads(each), list) for each in rows["layout"].unique()[:500])
+    assert all(isinstance(json.loads(value), list) for value in rows["layout"].unique()[:500])
     bare = rows[rows["layout"] == "[]"]
     np.testing.assert_allclose(bare["impulse_pa_s"], bare["unprotected_impulse_pa_s"], rtol=0.01)
 
@@ -63,16 +63,16 @@ def test_published_blasts_are_served_for_the_same_cells_and_version(
     )
     assert remember_published(store, [site]) == len(store) > 0
     charge = Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"])
-    layout = tuple(Piece(*each) for each in json.loads(row["layout"]))
+    layout = tuple(Piece(*load) for load in json.loads(row["layout"]))
     fine, same = (
-        BlastEvaluator(site, GasEngine(cell_m=each, version=made_by), cache=store)
-        for each in (0.25, 0.5)
+        BlastEvaluator(site, GasEngine(cell_m=value, version=made_by), cache=store)
+        for value in (0.25, 0.5)
     )
     assert store.get(fine.key(layout, LoadCase(charge, 0))) is None
     (load,) = (
-        each
-        for each in same.loads(layout, LoadCase(charge, 0)).structures
-        if each.name == row["structure"]
+        structure
+        for structure in same.loads(layout, LoadCase(charge, 0)).structures
+        if structure.name == row["structure"]
     )
     assert load.impulse_pa_s == row["impulse_pa_s"]
     assert same.counts.blasts == 0

@@ -131,9 +131,9 @@ def test_the_command_takes_both_kinds_of_files_and_writes_the_page(tmp_path: Pat
 
 def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
     known = stored_references()
-    for each in shipped_standings():
-        assert set(each.problems) <= set(known)
-        assert all(0 <= made.blasts <= made.budget for made in each.runs)
+    for shipped_standing in shipped_standings():
+        assert set(shipped_standing.problems) <= set(known)
+        assert all(0 <= made.blasts <= made.budget for made in shipped_standing.runs)
 
 
 def test_the_page_of_the_documentation_shows_them() -> None:
@@ -218,8 +218,8 @@ def test_leads_of_many_methods_are_corrected_for_their_number() -> None:
 @pytest.mark.parametrize(("most", "places"), [(2, 2), (16, 3)])
 def test_fixed_charges_of_ones_own_site_are_problems_once_each(most: int, places: int) -> None:
     found = site_problems("control_room", most)
-    assert [each.place for each in found] == list(range(1, places + 1))
-    charges = [each.case.charge for each in found]
+    assert [site_problem.place for site_problem in found] == list(range(1, places + 1))
+    charges = [site_problem.case.charge for site_problem in found]
     assert len(set(charges)) == places
     (hidden,) = site_problems("control_room", is_hidden=True)
     assert set(hidden.case.charges) == set(charges) or most == 2
@@ -227,8 +227,8 @@ def test_fixed_charges_of_ones_own_site_are_problems_once_each(most: int, places
 
 def test_charges_on_a_line_are_drawn_at_different_places() -> None:
     found = site_problems("courtyard", 3)
-    assert len({each.case.charge for each in found}) == 3
-    assert len({each.case.threats[0].seed for each in found}) == 3
+    assert len({site_problem.case.charge for site_problem in found}) == 3
+    assert len({site_problem.case.threats[0].seed for site_problem in found}) == 3
 
 
 def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(

@@ -131,8 +131,8 @@ def test_every_version_says_what_it_said() -> None:
     """The digest has the site, the charges and the budgets; a change needs a new version."""
     known = stored_references()
     assert set(known) == set(DEFINITIONS)
-    assert {name: each.digest for name, each in DEFINITIONS.items()} == {
-        name: each.digest for name, each in known.items()
+    assert {name: definition.digest for name, definition in DEFINITIONS.items()} == {
+        name: value.digest for name, value in known.items()
     }
 
 
@@ -156,7 +156,7 @@ def test_families_ask_what_they_say() -> None:
         assert (case.charge is not None) == (definition.family == "known")
         if definition.family == "vehicle":
             assert scenario.vehicles
-        points = [each for each in scenario.charge if isinstance(each, PointSource)]
+        points = [source for source in scenario.charge if isinstance(source, PointSource)]
         if definition.family == "hidden" and len(points) == len(scenario.charge):
             assert len(case.threats) == len(search_set.threats) == len(points)
         assert (definition.family == "response") == scenario.objective.is_response
@@ -165,12 +165,18 @@ def test_families_ask_what_they_say() -> None:
 
 
 def test_what_is_stored_can_be_built() -> None:
-    for name, each in stored_references().items():
+    for name, stored_reference in stored_references().items():
         if DEFINITIONS[name].site.startswith("site_"):
             continue  # drawing a site takes half a second
         own = make(name)
-        assert own.check(each.rule.layout) == own.check(each.best.layout) == ()
-        assert each.best.shares["0.5"] <= each.rule.shares["0.5"] == min(each.rules.values())
+        assert (
+            own.check(stored_reference.rule.layout) == own.check(stored_reference.best.layout) == ()
+        )
+        assert (
+            stored_reference.best.shares["0.5"]
+            <= stored_reference.rule.shares["0.5"]
+            == min(stored_reference.rules.values())
+        )
 
 
 def test_sites_of_a_secret_are_the_same_again_and_of_no_other() -> None:
@@ -178,7 +184,7 @@ def test_sites_of_a_secret_are_the_same_again_and_of_no_other() -> None:
     assert sites == secret_sites("the judge's own", 3)
     assert sites[:2] == secret_sites("the judge's own", 2)
     assert not set(sites) & set(secret_sites("the judge's own ", 3))
-    assert all(int(each.site.removeprefix("site_")) >= 2**62 for each in sites)
+    assert all(int(site.site.removeprefix("site_")) >= 2**62 for site in sites)
     assert sites[0].scenario.zone.items
     with pytest.raises(BlastEnvError, match="secret has 3 characters, must have at least 8"):
         secret_sites("abc", 3)
@@ -216,7 +222,7 @@ def test_any_keys_are_a_legal_layout(site: str) -> None:
         layout = space.from_keys(keys)
         assert space.reasons_against(layout) == ()
         assert space.layout(space.choices_of(layout)) == tuple(
-            sorted(layout, key=lambda each: (each[0], each[1]))
+            sorted(layout, key=lambda element: (element[0], element[1]))
         )
 
     check()
@@ -249,7 +255,7 @@ def test_every_measure_is_a_place_of_its_own() -> None:
     assert sorted(space.layout(choices)) == sorted(layout)
     rng = np.random.default_rng(0)
     drawn = [space.from_keys(rng.random(space.keys)) for _ in range(30)]
-    assert any(sum(isinstance(each, Measure) for each in own) == 2 for own in drawn)
+    assert any(sum(isinstance(case, Measure) for case in own) == 2 for own in drawn)
 
 
 def test_a_vector_of_use_to_nobody_is_refused() -> None:

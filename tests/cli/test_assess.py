@@ -48,7 +48,7 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
     rows = {line.split()[0]: line for line in output.splitlines() if line.startswith("window")}
     assert rows["window_annealed_6"].endswith("does not comply")
     assert rows["window_laminated_6"].endswith("complies (flagged)")
-    assert all(each.stat().st_size > 1000 for each in (picture, diagram))
+    assert all(case.stat().st_size > 1000 for case in (picture, diagram))
     bays = pd.read_csv(table).astype(str)
     assert "control_room/west/1/1" in bays.to_numpy()
 
@@ -89,11 +89,11 @@ def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
     blast_env.save_scenario(glazed_hut(), site)
     layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
     output = run(site, "--layout", layout)
-    line = next(each for each in output.splitlines() if each.startswith("impulse on the protected"))
+    line = next(line for line in output.splitlines() if line.startswith("impulse on the protected"))
     assert line.count(" +- ") == 3
-    likely = [each for each in output.splitlines() if each.startswith("probability, ")]
-    assert [each.split(",")[1][:5] for each in likely] == [" 6 ba", " no b"]
-    assert all("'low' with " in each for each in likely)
-    panes = [each for each in output.splitlines() if each.startswith(("no barrier", "6 barrier"))]
-    assert all(" +- " in each for each in panes)
+    likely = [line for line in output.splitlines() if line.startswith("probability, ")]
+    assert [line.split(",")[1][:5] for line in likely] == [" 6 ba", " no b"]
+    assert all("'low' with " in line for line in likely)
+    panes = [line for line in output.splitlines() if line.startswith(("no barrier", "6 barrier"))]
+    assert all(" +- " in pane for pane in panes)
     assert len(panes) == 2

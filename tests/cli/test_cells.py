@@ -42,7 +42,7 @@ def test_training_and_its_evaluations_use_the_cells(
 ) -> None:
     folder = tmp_path / "run"
     small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")
-    options = [text for each in small for text in ("--set", each)]
+    options = [text for name in small for text in ("--set", name)]
     given = ("--scenario", site, "--run", folder, "--envs", 1, "--steps", 4)
     result = run("train", *given, "--engine", "gas", "--cell", 0.25, *options)
     assert result.exit_code == 0, result.output

@@ -38,7 +38,11 @@ def run(*arguments: object, columns: int = NARROW) -> Result:
 def commands() -> dict[str, LazyCommand]:
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
-    return {name: each for name, each in group.commands.items() if isinstance(each, LazyCommand)}
+    return {
+        name: command
+        for name, command in group.commands.items()
+        if isinstance(command, LazyCommand)
+    }
 
 
 def words_of(text: str) -> set[str]:
@@ -53,7 +57,7 @@ def words_of(text: str) -> set[str]:
 def test_every_word_of_the_help_is_shown(name: str) -> None:
     """Rich takes `[row, column]` for a style of its own, and leaves it out."""
     shown, command = words_of(run(name, "--help").stdout), commands()[name].loaded
-    helps = [str(getattr(each, "help", None) or "") for each in command.params]
+    helps = [str(getattr(parameter, "help", None) or "") for parameter in command.params]
     for text in [command.help or "", *helps]:
         assert words_of(text) <= shown
 
@@ -73,7 +77,7 @@ def test_there_are_at_most_twelve_commands() -> None:
 def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
     """Both come from the engines: a new one, or a new setting of one, is seen."""
     options = commands()[name].loaded.params
-    helps = {each.name: str(getattr(each, "help", "")) for each in options}
+    helps = {option.name: str(getattr(option, "help", "")) for option in options}
     for engine in ENGINE_NAMES:
         assert engine in helps["engine"]
         for setting in find_engine(engine).options:
@@ -152,16 +156,18 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
     result = run("search", "--scenario", site, *options, *CHARGE, "--engine", "event")
     assert result.exit_code == 0, result.output
     threats = LayoutFile.load(tmp_path / "out" / "layout.json").provenance["threats"]
-    assert {(*each["charge_position_m"], each["tnt_kg"]) for each in threats} == {(5.0, 19.0, 60.0)}
+    assert {(*threat["charge_position_m"], threat["tnt_kg"]) for threat in threats} == {
+        (5.0, 19.0, 60.0)
+    }
     assert {"--charge", "--tnt-kg"} <= words_of(run("search", "--help").stdout)
 
 
 def test_all_commands_take_a_charge_in_one_form() -> None:
     forms = {
-        name: getattr(each, "metavar", None)
+        name: getattr(parameter, "metavar", None)
         for name, command in commands().items()
-        for each in command.loaded.params
-        if "--charge" in each.opts
+        for parameter in command.loaded.params
+        if "--charge" in parameter.opts
     }
     assert {"simulate", "evaluate", "search", "assess", "advise", "report"} <= {*forms}
     assert {*forms.values()} == {"X,Y[,KG]"}
@@ -235,14 +241,14 @@ def test_an_interruption_says_how_to_go_on_and_leaves_no_empty_folder(
     """Nor a layout, since a search without a blast has found none: only the store, still empty."""
     monkeypatch.chdir(tmp_path)
     given = () if arguments[0] == "calibrate" else ("--scenario", site)
-    result = run(*(layout if each == "LAYOUT" else each for each in arguments), *given)
+    result = run(*(layout if argument == "LAYOUT" else argument for argument in arguments), *given)
     assert result.exit_code == 130, result.output
     assert f"interrupted: no file was left half-written; {resume}" in " ".join(
         result.stderr.split()
     )
     left = [*tmp_path.rglob("*")]
-    assert all(any(each.iterdir()) for each in left if each.is_dir())
-    assert all(each.suffix.startswith(".sqlite") for each in left if each.is_file())
+    assert all(any(path.iterdir()) for path in left if path.is_dir())
+    assert all(path.suffix.startswith(".sqlite") for path in left if path.is_file())
 
 
 # Runs that were interrupted.
@@ -259,7 +265,7 @@ def test_an_interrupted_training_says_how_to_go_on(
 
     monkeypatch.setattr(HeldOutCallback, "_record", interrupt)
     changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1", "evaluation_cases=2")
-    options = [text for each in changes for text in ("--set", each)]
+    options = [text for change in changes for text in ("--set", change)]
     result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)
     assert result.exit_code == 130, result.output
     assert f"blast-env train --resume {folder} continues the run" in result.stderr

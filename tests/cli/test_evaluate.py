@@ -45,7 +45,7 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     assert f"mean of the worst 20 % {expected.cvar:,.0f} Pa s" in result.stdout
     assert f"seed {expected.worst.threat.seed}: {expected.worst.impulse_pa_s:,.0f}" in result.stdout
     assert "means over 3 threats (seeds 7 to 9)" in result.stdout
-    tables = [f"{each}.csv" for each in ("structures", "buildings", "modules", "threats")]
+    tables = [f"{name}.csv" for name in ("structures", "buildings", "modules", "threats")]
     for name in ("evaluation.json", *tables):
         assert f"wrote {out / name}" in result.stdout
     for name, table in (("structures", expected.table), ("threats", expected.threat_table)):
@@ -110,7 +110,7 @@ def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
 
 def test_fixed_charges_count_once_each_and_are_named(tmp_path: Path) -> None:
     places = ((2.0, 5.0), (2.0, 7.0), (2.0, 9.0))
-    points = tuple(PointSource(kind="point", position_m=each, tnt_kg=100.0) for each in places)
+    points = tuple(PointSource(kind="point", position_m=place, tnt_kg=100.0) for place in places)
     save_scenario(small_scenario().model_copy(update={"charge": points}), tmp_path / "points.toml")
     (tmp_path / "layout.json").write_text("[]")
     site = ("--scenario", tmp_path / "points.toml", "--layout", tmp_path / "layout.json")

@@ -103,12 +103,14 @@ def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:
     (row,) = (line.split() for line in rows if "half" in line or "town_hall" in line)
     assert row[:3] == ["town_hall", "yes", "16"]
     printed = json.loads(run("simulate", path, "--engine", "event", "--json").stdout)
-    (hall,) = (each for each in printed["buildings"] if each["building"] == "town_hall")
-    halves = [each for each in printed["structures"] if each["structure"].endswith("half")]
+    (hall,) = (building for building in printed["buildings"] if building["building"] == "town_hall")
+    halves = [
+        structure for structure in printed["structures"] if structure["structure"].endswith("half")
+    ]
     assert len(halves) == 2
     for name in ("modules", "hits"):
-        assert hall[name] == sum(each[name] for each in halves)
-    assert hall["impulse_sim"] == pytest.approx(sum(each["impulse_sim"] for each in halves))
+        assert hall[name] == sum(half[name] for half in halves)
+    assert hall["impulse_sim"] == pytest.approx(sum(half["impulse_sim"] for half in halves))
     printed = json.loads(run("simulate", path, "--engine", "gas", "--until", 0.01, "--json").stdout)
-    assert [each["parts"] for each in printed["buildings"]] == ["south_half north_half"]
+    assert [building["parts"] for building in printed["buildings"]] == ["south_half north_half"]
     assert set(printed["impulse"]) == {"south_half", "north_half"}

@@ -44,7 +44,7 @@ def test_report_as_json_has_the_same(tmp_path: Path) -> None:
     code, text, _ = run(BLOCK, *place, *options[:-2], "--out", out, "--json")
     report = json.loads(text)
     assert code == 0
-    (hall,) = (each for each in report["buildings"] if each["protected"])
+    (hall,) = (building for building in report["buildings"] if building["protected"])
     assert hall["title"] == "Town Hall"
     assert hall["is_cut"]
     scenario = load_scenario(out)
@@ -70,7 +70,7 @@ def test_protected_buildings_have_the_windows_and_walls_that_are_asked_for(tmp_p
     out = tmp_path / "block.toml"
     filled = ("--glazing", "window_annealed_6", "--wall", "brick_215")
     assert run(BLOCK, "--protect", "Town Hall", *filled, "--out", out)[0] == 0
-    facades = {each.name: each.facade for each in load_scenario(out).structures}
+    facades = {structure.name: structure.facade for structure in load_scenario(out).structures}
     hall = facades.pop("Town_Hall")
     assert hall is not None
     assert (hall.glazing, hall.wall) == ("window_annealed_6", "brick_215")

@@ -27,16 +27,16 @@ def test_an_agent_of_visible_charges_gets_each_charge_as_a_problem(tmp_path: Pat
     site = scenario_file(tmp_path)
     found = judged_agent(tmp_path, site, "--cases", 3)
     agent, problems = load_agent(tmp_path / "run"), site_problems(site, 3)
-    assert [each.problem for each in found.runs] == [each.name for each in problems]
-    for each, problem in zip(found.runs, problems, strict=True):
+    assert [played.problem for played in found.runs] == [problem.name for problem in problems]
+    for played, problem in zip(found.runs, problems, strict=True):
         proposed = agent.propose(problem.scenario, problem.case.charge)
-        assert each.layout == tuple(sorted(proposed))
-        assert each.blasts == 0
+        assert played.layout == tuple(sorted(proposed))
+        assert played.blasts == 0
 
 
 def test_generated_sites_are_held_out_from_training(tmp_path: Path) -> None:
     found = judged_agent(tmp_path, Path("sites"), "--cases", 2)
-    problems = {each.name: each for each in site_problems("sites", 2)}
+    problems = {site_problem.name: site_problem for site_problem in site_problems("sites", 2)}
     assert [*found.problems] == [*problems]
-    for each in found.runs:
-        assert check_layout(problems[each.problem].scenario, each.layout)
+    for played in found.runs:
+        assert check_layout(problems[played.problem].scenario, played.layout)

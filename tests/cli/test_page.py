@@ -48,7 +48,7 @@ def test_the_address_that_is_printed_has_a_token_that_is_new_each_time(
     found = [
         re.search(rf"http://localhost:{taken}/\?token=(\S{{43}}) ", run(*asked)[1]) for _ in "ab"
     ]
-    tokens = {each[1] for each in found if each is not None}
+    tokens = {case[1] for case in found if case is not None}
     assert len(tokens) == 2
 
 

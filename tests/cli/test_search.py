@@ -71,8 +71,8 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
     assert "mean of the worst 20 %" in result.stdout
     threats = search_set(scenario, None, 1, 0, charges=3).threats
     listed = json.loads((out / "layout.json").read_text())["provenance"]["threats"]
-    assert [each["seed"] for each in listed] == [threat.seed for threat in threats]
-    assert len({tuple(each["charge_position_m"]) for each in listed}) == 3
+    assert [name["seed"] for name in listed] == [threat.seed for threat in threats]
+    assert len({tuple(name["charge_position_m"]) for name in listed}) == 3
 
 
 def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:

@@ -102,9 +102,9 @@ def test_a_raised_charge_keeps_the_ground() -> None:
 @given(st.sampled_from(["overpressure", "impulse"]), st.floats(5.0, 30.0), st.floats(0.0, 6.0))
 def test_loads_do_not_jump_with_the_height(load: Load, away_m: float, up_m: float) -> None:
     heights_m = np.append(0.0, np.geomspace(1e-6, 3.0, 400))
-    values = np.log([on_wall(load, away_m, 2.0, up_m, each) for each in heights_m])
+    values = np.log([on_wall(load, away_m, 2.0, up_m, height_m) for height_m in heights_m])
     assert np.abs(np.diff(values)).max() < 0.09
-    near = np.log([on_wall(load, away_m, 2.0, up_m, each) for each in (1.085, 1.087)])
+    near = np.log([on_wall(load, away_m, 2.0, up_m, value) for value in (1.085, 1.087)])
     assert np.abs(np.diff(near)).max() < 0.01  # 0.4 m/kg^(1/3), where the free-air curve began
 
 

@@ -45,9 +45,9 @@ def test_every_case_counts_alike_in_the_reduction() -> None:
     cases = cases_of(*((site, seed) for seed in range(4)))
     comparison = compare(Evaluators("event"), cases, [WALLS[0]] * 4)
     expected = evaluate_layout(site, WALLS[0], range(4), engine="event")
-    each = [outcome.reduction for outcome in expected.outcomes]
-    assert comparison.case_reductions.tolist() == pytest.approx(each)
-    assert comparison.reduction.value == pytest.approx(sum(each) / 4)
+    reductions = [outcome.reduction for outcome in expected.outcomes]
+    assert comparison.case_reductions.tolist() == pytest.approx(reductions)
+    assert comparison.reduction.value == pytest.approx(sum(reductions) / 4)
 
 
 def test_generated_sites_choose_weights_by_the_last_ones_held_out() -> None:
@@ -55,7 +55,7 @@ def test_generated_sites_choose_weights_by_the_last_ones_held_out() -> None:
     cases = Selection.of(settings, SiteSource.training()).cases
     last = SiteSource(HELD_OUT_SITES - 2, 2)
     assert [case.scenario for case in cases] == list(last)
-    judged = [each.scenario for each in site_problems("sites", 3)]
+    judged = [site_problem.scenario for site_problem in site_problems("sites", 3)]
     assert judged == list(SiteSource.held_out(3))
 
 
@@ -75,7 +75,7 @@ def test_sites_are_evaluated_in_the_order_of_their_cases_with_progress() -> None
 
 def test_fixed_charges_come_in_turn_in_training_and_selection() -> None:
     places = ((3.0, 6.5), (3.0, 9.0), (3.0, 11.5))
-    points = tuple(PointSource(kind="point", position_m=each, tnt_kg=20.0) for each in places)
+    points = tuple(PointSource(kind="point", position_m=place, tnt_kg=20.0) for place in places)
     source = SingleScenario(small_scenario().model_copy(update={"charge": points}))
     for cases in (
         training_cases(SETTINGS, source, 3),

@@ -34,7 +34,7 @@ class Additive:
     shares: Mapping[Any, float]
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
-        return np.array([100.0 * (1.0 - sum(map(self._share, each))) for each in layouts])
+        return np.array([100.0 * (1.0 - sum(map(self._share, layout))) for layout in layouts])
 
     def _share(self, element: Any) -> float:
         return self.shares.get(element, 0.0)
@@ -67,7 +67,7 @@ def test_the_gain_that_is_expected_is_that_of_the_surrogate_and_no_less_than_a_r
     assert found.gain is not None
     assert found.gain == pytest.approx(1.0 - load / unprotected)
     assert found.gain > package.LEAST_GAIN
-    rules = [tuple(sorted(each)) for each in layouts_by_rule(wide_yard(), CHARGE).values()]
+    rules = [tuple(sorted(layout)) for layout in layouts_by_rule(wide_yard(), CHARGE).values()]
     assert load <= guesses.loads(rules).min()
 
 

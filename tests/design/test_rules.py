@@ -35,7 +35,7 @@ BUILDING_M = (32.0, 20.0)
 def centres_m(scenario: Scenario, layout: Layout) -> np.ndarray:
     """Return the centres of modules (n, 2)."""
     zone = scenario.zone
-    return np.array([zone.element_rectangle_m(each).centre for each in layout])
+    return np.array([zone.element_rectangle_m(element).centre for element in layout])
 
 
 def covered_m(scenario: Scenario, layout: Layout, charge: Charge) -> list[tuple[float, float]]:
@@ -43,7 +43,7 @@ def covered_m(scenario: Scenario, layout: Layout, charge: Charge) -> list[tuple[
     across = sight(charge)[::-1] * (-1.0, 1.0)
     half_m = 0.25 * float(np.abs(across).sum())
     aside_m = np.sort((centres_m(scenario, layout) - charge.position_m) @ across)
-    return [(float(each) - half_m, float(each) + half_m) for each in aside_m]
+    return [(float(distance_m) - half_m, float(distance_m) + half_m) for distance_m in aside_m]
 
 
 def sight(charge: Charge) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
         BUILDING_M[0] - distance_m * np.cos(angle),
         BUILDING_M[1] - distance_m * np.sin(angle),
     )
-    assume(all(1.0 < each < 39.0 for each in charge_m))
+    assume(all(1.0 < coordinate_m < 39.0 for coordinate_m in charge_m))
     charge = Charge(charge_m, 100.0)
     scenario = site(stock=stock, corner_m=(1.0, 1.0), rows=76, columns=56, keep_outs=())
     scenario = scenario.model_copy(
@@ -266,7 +266,7 @@ def test_random_layouts_are_legal_and_use_what_there_is(name: str) -> None:
     """Full stock, or nothing left that could be afforded or would leave the way open."""
     scenario = load_scenario(name)
     drawn = [random_layout(scenario, np.random.default_rng(seed)) for seed in (0, 1, 2, 3, 3)]
-    assert all(LayoutState.of(scenario, each).is_full for each in drawn)
+    assert all(LayoutState.of(scenario, draw).is_full for draw in drawn)
     assert drawn[3] == drawn[4]
     assert set(drawn[2]) != set(drawn[3])
 

@@ -97,14 +97,14 @@ def test_it_ends_when_nothing_new_is_asked(problem: DesignProblem) -> None:
 def test_a_layout_that_has_met_more_threats_goes_before(problem: DesignProblem) -> None:
     """One that looks better under one threat does not replace one that has met two."""
     it = session(problem, 100)
-    by_first = sorted(LAYOUTS, key=lambda each: it.assess([each])[0])
+    by_first = sorted(LAYOUTS, key=lambda layout: it.assess([layout])[0])
     best, worst = by_first[0], by_first[-1]
     assert it.best is not None
     assert it.best.layout == best
     it.assess([worst], 2)
     assert it.best.layout == worst
     it.assess([best], 2)
-    assert it.best.layout == min(best, worst, key=lambda each: it.assess([each], 2)[0])
+    assert it.best.layout == min(best, worst, key=lambda layout: it.assess([layout], 2)[0])
 
 
 def test_the_lucky_one_is_found_out(problem: DesignProblem) -> None:
@@ -114,7 +114,7 @@ def test_the_lucky_one_is_found_out(problem: DesignProblem) -> None:
     assert it.best is not None
     impulses = {layout: problem.load(layout) for layout in LAYOUTS}
     assert it.best.threats == 4
-    assert it.best.layout == min(impulses, key=lambda each: impulses[each])
+    assert it.best.layout == min(impulses, key=lambda impulse: impulses[impulse])
     assert it.best.load == pytest.approx(min(impulses.values()))
 
 
@@ -127,7 +127,7 @@ def test_the_front_is_the_front(problem: DesignProblem) -> None:
     pairs = [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0))]
     it.assess([(), *LAYOUTS, *pairs])
     front = it.front()
-    assert [len(each.layout) for each in front] == [0, 1, 2]
+    assert [len(candidate.layout) for candidate in front] == [0, 1, 2]
     for fewer, more in pairwise(front):
         assert fewer.load > more.load
     assert front[1].load == it.assess(LAYOUTS).min()
@@ -252,7 +252,7 @@ def test_a_cut_takes_each_side_from_one_parent(seed: int) -> None:
     first, second = (tuple((row, column) for row in range(8)) for column in (0, 1))
     child = cut(first, second, np.random.default_rng(seed))
     assert len(child) == 8
-    rows = sorted(each[0] for each in child if each[1] == 0)
+    rows = sorted(node[0] for node in child if node[1] == 0)
     assert rows in (list(range(len(rows))), list(range(8 - len(rows), 8)))
 
 

@@ -121,7 +121,7 @@ def test_histories_say_what_was_best_when(name: str, problem: DesignProblem) -> 
     assert result.best_at(last.blasts - 1) in (None, *result.history[:-1])
     assert result.best_at(60) == last
     table = result.history_table()
-    assert table["modules"].tolist() == [len(each.layout) for each in result.history]
+    assert table["modules"].tolist() == [len(step.layout) for step in result.history]
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -203,12 +203,12 @@ def test_the_front_is_near_the_true_one(problem: DesignProblem, optimum: Layout)
     result = find_proposer("nsga2").propose(problem, ALL_BLASTS // 2, 1)
     bare_pa_s = problem.load(())
     layouts = every_layout(problem)
-    assert [len(each.layout) for each in result.front] == [0, 1, 2, 3]
-    for each in result.front:
+    assert [len(candidate.layout) for candidate in result.front] == [0, 1, 2, 3]
+    for candidate in result.front:
         true_pa_s = min(
-            problem.load(layout) for layout in layouts if len(layout) <= len(each.layout)
+            problem.load(layout) for layout in layouts if len(layout) <= len(candidate.layout)
         )
-        assert (problem.load(each.layout) - true_pa_s) / bare_pa_s <= 0.03
+        assert (problem.load(candidate.layout) - true_pa_s) / bare_pa_s <= 0.03
     assert result.layout == result.front[-1].layout
     assert len(result.front_table()) == 4
 

@@ -190,5 +190,5 @@ STEPS: Final[dict[str, tuple[Step, ...]]] = {
     page: tuple(steps(page, text)) for page, text in TEXTS.items()
 }
 COMMANDS: Final = sorted(
-    {each for page, text in TEXTS.items() for each in commands(page, text)}, key=str
+    {command for page, text in TEXTS.items() for command in commands(page, text)}, key=str
 )

@@ -42,7 +42,7 @@ def faults(text: str) -> list[str]:
         if len(_LINK.sub(r"\1", line)) > MOST_CHARACTERS
     ]
     every = list(sentences(text))
-    lengths = [len(_words(each)) for each in every]
+    lengths = [len(_words(thing)) for thing in every]
     if lengths and median(lengths) > MEDIAN_WORDS:
         found.append(f"median sentence of {median(lengths):g} words")
     for sentence, length in zip(every, lengths, strict=True):

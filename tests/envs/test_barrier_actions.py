@@ -203,7 +203,7 @@ def test_an_illegal_action_means_the_nearest_legal_cell() -> None:
     env = make(scenario)
     _, info = env.reset(seed=0)
     mask = info["action_mask"]
-    legal = [divmod(int(each), columns) for each in np.flatnonzero(mask[:-1])]
+    legal = [divmod(int(index), columns) for index in np.flatnonzero(mask[:-1])]
     illegal = np.flatnonzero(mask == 0).tolist()
     assert len(illegal) > 20
     for action in illegal:

@@ -53,7 +53,7 @@ def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
         for layout in (info["layout"], ())
     ]
     impulse, unprotected = (
-        np.mean([loads.protected_impulse_pa_s for loads in each]) for each in by_hand
+        np.mean([loads.protected_impulse_pa_s for loads in value]) for value in by_hand
     )
     assert info["impulse_pa_s"] == impulse
     assert info["impulse_psi_s"] == pytest.approx(impulse / PA_PER_PSI)
@@ -130,9 +130,9 @@ def test_terminal_rewards_add_up_to_the_impulse_and_the_deposit_comes_back() -> 
     steps = play(make(), seed=5)[1:]
     terms = [step[4]["reward_terms"] for step in steps]
     impulse_psi_s = steps[-1][4]["impulse_psi_s"]
-    assert [each["impulse"] for each in terms] == [0.0] * (len(terms) - 1) + [-impulse_psi_s]
+    assert [term["impulse"] for term in terms] == [0.0] * (len(terms) - 1) + [-impulse_psi_s]
     assert sum(step[1] for step in steps) == pytest.approx(-impulse_psi_s, rel=1e-12)
-    deposits = [each["deposit"] for each in terms]
+    deposits = [term["deposit"] for term in terms]
     unprotected_psi_s = steps[-1][4]["unprotected_impulse_pa_s"] / PA_PER_PSI
     assert deposits[0] == -deposits[-1] == pytest.approx(-2.0 * unprotected_psi_s)
     assert not any(deposits[1:-1])
@@ -264,23 +264,23 @@ def test_hidden_threats_count_as_their_mean_or_their_worst() -> None:
         assert info["blast_seeds"] == ((10,), (11,), (12,), (13,))
         assert len(set(info["charges"])) > 1
     evaluator = BlastEvaluator(small_scenario(), ThinEngine())
-    each = [
+    loads_pa_s = [
         evaluator.loads(info["layout"], LoadCase(charge, seed)).protected_impulse_pa_s
         for charge, (seed,) in zip(info["charges"], info["blast_seeds"], strict=True)
     ]
-    assert impulses["mean"] == pytest.approx(np.mean(each))
-    assert impulses["half"] == pytest.approx(np.mean(sorted(each)[2:]))
-    assert impulses["worst"] == pytest.approx(max(each))
-    assert impulses["own"] == pytest.approx(3.0 * each[0])
+    assert impulses["mean"] == pytest.approx(np.mean(loads_pa_s))
+    assert impulses["half"] == pytest.approx(np.mean(sorted(loads_pa_s)[2:]))
+    assert impulses["worst"] == pytest.approx(max(loads_pa_s))
+    assert impulses["own"] == pytest.approx(3.0 * loads_pa_s[0])
 
 
 def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> None:
     env, twin = make(observation="features"), make(observation="features")
     first, second, again = play(env, 3), play(twin, 3), play(env, 3)
     assert same(first, second)
-    for each in (first, again):
+    for case in (first, again):
         for count in ("blasts", "cache_hits", "cache_hit_rate"):  # these go on
-            del each[-1][4][count]
+            del case[-1][4][count]
     assert same(first, again)
     assert not same(first[-1][4]["charges"], play(env, 4)[-1][4]["charges"])
 

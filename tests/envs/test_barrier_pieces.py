@@ -125,7 +125,7 @@ def test_features_end_with_what_pieces_may_go_where() -> None:
 
 
 def test_scenarios_of_one_source_share_items_but_not_their_costs() -> None:
-    dearer = [{**each, "cost": 2.0, "height_m": 3.0} for each in ITEMS]
+    dearer = [{**item, "cost": 2.0, "height_m": 3.0} for item in ITEMS]
     check_size(yard(items=dearer), yard())
     with pytest.raises(BlastEnvError, match=r"the catalogue \(item, turned, size\) is"):
         check_size(yard(items=[*ITEMS[:2], item("stone", 1, 1, 1.0)]), yard())

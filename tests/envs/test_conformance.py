@@ -55,7 +55,7 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
 @pytest.mark.parametrize(
     "chosen",
     [
-        *({"observation": each} for each in ("image", "grid", "features", "dict")),
+        *({"observation": name} for name in ("image", "grid", "features", "dict")),
         {"observation": "grid", "reward": "incremental", "threat": "hidden", "threats": 2},
         {"reward": "relative", "threat": "hidden", "threats": 2},
         {"observation": "dict", "action": "item_then_place", "invalid_action": "penalty"},
@@ -112,7 +112,7 @@ def test_paths_and_layouts_survive_json(tmp_path: Path) -> None:
     save_scenario(small_scenario(), path)
     wall = ((0, 0), (1, 0))
     env = gym.make("BlastSimulator-v0", scenario=path, layout=wall, engine="event")
-    observations = [each.reset(seed=1) for each in (env, remade(env))]
+    observations = [case.reset(seed=1) for case in (env, remade(env))]
     assert np.argwhere(observations[0][1]["layout"][0]).tolist() == [*map(list, wall)]
     assert same(*observations)
 

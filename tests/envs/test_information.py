@@ -18,7 +18,7 @@ from tests.libraries.ids import BARRIER_IDS, IDS, arguments
 def structure(info: Any) -> Any:
     """Return the keys, shapes and types of nested information."""
     if isinstance(info, Mapping):
-        return {key: structure(each) for key, each in info.items()}
+        return {key: structure(value) for key, value in info.items()}
     if isinstance(info, tuple):
         return tuple(map(structure, info))
     if isinstance(info, np.ndarray):
@@ -56,8 +56,8 @@ def test_the_layout_of_the_information_is_one() -> None:
     env = make()
     info = play(env, seed=1)[-1][4]
     by_layout, by_array = (
-        blast_env.simulate(small_scenario(), each, engine=ThinEngine()).digest
-        for each in (sorted(env.placement.layout), info["layout"])
+        blast_env.simulate(small_scenario(), case, engine=ThinEngine()).digest
+        for case in (sorted(env.placement.layout), info["layout"])
     )
     assert by_layout == by_array
 

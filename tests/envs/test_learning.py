@@ -39,14 +39,16 @@ class SightEngine(ShadeEngine):
         x_m, y_m = scenario.zone.centres_m
         places = np.array([(x_m[cell[:2]], y_m[cell[:2]]) for cell in layout]).reshape(-1, 2)
         loads = []
-        for each in scenario.structures:
-            along = np.array(each.rectangle_m.centre) - start
+        for structure in scenario.structures:
+            along = np.array(structure.rectangle_m.centre) - start
             across = np.array([-along[1], along[0]]) / np.hypot(*along)
             beside_m = (places - start) @ across
             left = self.share ** int((np.abs(beside_m) < 1.0).sum())
-            loads.append(StructureLoad.on(each, 1000.0 * left, notes=("a formula, not a blast",)))
-        modules = [each.rows * each.columns for each in scenario.structures]
-        return BlastLoads(tuple(loads), np.repeat([each.impulse_pa_s for each in loads], modules))
+            loads.append(
+                StructureLoad.on(structure, 1000.0 * left, notes=("a formula, not a blast",))
+            )
+        modules = [structure.rows * structure.columns for structure in scenario.structures]
+        return BlastLoads(tuple(loads), np.repeat([load.impulse_pa_s for load in loads], modules))
 
 
 def environment() -> BlastBarrierEnv:

@@ -239,7 +239,7 @@ def test_what_is_seen_spreads_from_the_charge(
     assert planes[2][:, 16:].any()
     assert not planes[2][6:10, 12:16].any()  # the hut is solid
     assert max(rewards) <= 0.0
-    assert (np.diff([each["time_s"][0] for each in observations]) > 0.0).all()
+    assert (np.diff([observation["time_s"][0] for observation in observations]) > 0.0).all()
 
 
 def test_gas_repeats_exactly_and_pickles(gas_episode: tuple[list[Any], list[float], dict]) -> None:

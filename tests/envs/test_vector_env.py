@@ -21,7 +21,7 @@ ENVS, STEPS = 3, 14
 
 
 def uncounted(info: dict[str, Any]) -> dict[str, Any]:
-    left = {key: each for key, each in info.items() if key.removeprefix("_") not in COUNTS}
+    left = {key: value for key, value in info.items() if key.removeprefix("_") not in COUNTS}
     return left | {"final_info": uncounted(left["final_info"])} if "final_info" in left else left
 
 
@@ -54,7 +54,7 @@ def rollout(mode: str, how: str, name: str = "BlastBarrier-v0", **chosen: Any) -
 
 def check_same(how: str = "NextStep", least: int = 2, **chosen: Any) -> None:
     expected = rollout("sync", how, **chosen)
-    assert sum((each[2] | each[3]).sum() for each in expected if len(each) == 5) >= least
+    assert sum((value[2] | value[3]).sum() for value in expected if len(value) == 5) >= least
     assert same(rollout("vector_entry_point", how, **chosen), expected)
 
 
@@ -64,7 +64,7 @@ def test_episodes_are_those_of_single_environments(observation: str) -> None:
     check_same(scenario=scenario, observation=observation, engine=ThinEngine(), realisations=1)
 
 
-@pytest.mark.parametrize("how", [each.value for each in AutoresetMode])
+@pytest.mark.parametrize("how", [mode.value for mode in AutoresetMode])
 def test_every_autoreset_mode(how: str) -> None:
     check_same(how, scenario=small_scenario(), engine=ThinEngine(), realisations=1)
 
@@ -130,7 +130,7 @@ def test_random_numbers_are_those_of_single_environments() -> None:
     for envs in vectors:
         envs.reset(seed=3)
         assert envs.np_random_seed == (3, 4, 5)
-    states = [[each.bit_generator.state for each in envs.np_random] for envs in vectors]
+    states = [[generator.bit_generator.state for generator in envs.np_random] for envs in vectors]
     assert states[0] == states[1]
     with pytest.raises(AttributeError, match="no setter"):
         vectors[0].unwrapped.np_random = np.random.default_rng(0)

@@ -35,7 +35,10 @@ BEHIND_SHADOW = tuple(LoadCase(Charge((5.0, 20.0), 100.0), seed) for seed in (0,
 
 def loads_of(scenario: Scenario, impulse_pa_s: float, *, in_range: bool = True) -> BlastLoads:
     """Return loads by hand, the same on every structure."""
-    loads = (StructureLoad.on(each, impulse_pa_s, 0.0, in_range) for each in scenario.structures)
+    loads = (
+        StructureLoad.on(structure, impulse_pa_s, 0.0, in_range)
+        for structure in scenario.structures
+    )
     return BlastLoads(tuple(loads), np.zeros(0))
 
 

@@ -65,7 +65,7 @@ def test_the_stand_off_ends_at_the_border_of_the_site(ladder: Ladder) -> None:
 
 def test_a_lower_level_bears_more(ladder: Ladder) -> None:
     edges = [ladder.edge(level) for level in list(LevelOfProtection)[1:]]
-    masses = [each.charge.tnt_kg for each in edges]
+    masses = [edge.charge.tnt_kg for edge in edges]
     assert masses == sorted(masses, reverse=True)
     before = ladder.blasts
     ladder.edge(LevelOfProtection.MEDIUM)

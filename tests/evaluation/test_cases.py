@@ -58,8 +58,8 @@ def test_unusable_charges_are_named(charge: Any) -> None:
 
 def test_ranges_of_seeds_are_disjoint() -> None:
     """Training, choice of weights, search and judgement never share a blast."""
-    ranges = sorted((each.value.start, each.value.stop) for each in SeedRange)
-    assert all(len(range(*each)) >= 2**31 for each in ranges)
+    ranges = sorted((seeds.value.start, seeds.value.stop) for seeds in SeedRange)
+    assert all(len(range(*case)) >= 2**31 for case in ranges)
     assert all(low[1] <= high[0] for low, high in pairwise(ranges))
 
 
@@ -82,7 +82,11 @@ def test_an_environment_draws_seeds_for_training() -> None:
     assert isinstance(env.action_space, gym.spaces.Discrete)
     finish = env.action_space.n - 1
     info = env.step(finish)[4]
-    assert all(seed in SeedRange.TRAINING.value for each in info["blast_seeds"] for seed in each)
+    assert all(
+        seed in SeedRange.TRAINING.value
+        for blast_seed in info["blast_seeds"]
+        for seed in blast_seed
+    )
 
 
 def test_a_search_meets_none_of_the_threats_that_judge() -> None:
@@ -127,7 +131,7 @@ def test_threats_out_of_order_are_refused() -> None:
 
 
 def points(*places_m: tuple[float, float]) -> Scenario:
-    sources = (PointSource(kind="point", position_m=each, tnt_kg=50.0) for each in places_m)
+    sources = (PointSource(kind="point", position_m=place_m, tnt_kg=50.0) for place_m in places_m)
     return COURTYARD.model_copy(update={"charge": tuple(sources)})
 
 
@@ -135,10 +139,10 @@ def points(*places_m: tuple[float, float]) -> Scenario:
 def test_every_fixed_charge_comes_once_before_any_comes_again(first: int) -> None:
     scenario = points((3.0, 8.0), (3.0, 12.0), (3.0, 20.0))
     threats = in_turn(scenario, draw_threats(scenario, range(first, first + 7)))
-    charges = [each.charge for each in threats]
+    charges = [threat.charge for threat in threats]
     assert set(charges[:3]) == set(charges[3:6]) == set(fixed_charges(scenario))
     assert charges[6] == charges[0]
-    assert [each.seed for each in threats] == [*range(first, first + 7)]
+    assert [threat.seed for threat in threats] == [*range(first, first + 7)]
     assert are_all(scenario, charges[:3])
     assert not are_all(scenario, charges[:2])
 
@@ -153,4 +157,4 @@ def test_charges_along_a_line_are_as_drawn() -> None:
     threats = draw_threats(COURTYARD, range(3))
     assert in_turn(COURTYARD, threats) == threats
     assert fixed_charges(COURTYARD) == ()
-    assert not are_all(COURTYARD, [each.charge for each in threats])
+    assert not are_all(COURTYARD, [threat.charge for threat in threats])

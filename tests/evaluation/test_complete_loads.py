@@ -30,7 +30,7 @@ def test_bays_that_are_cut_off_are_flagged() -> None:
     assert cut.notes[-1].startswith(words)
     assert not any("captured" in note for note in whole.notes)
     (response,) = whole.responses
-    assert set(response.known) == {each.bay.name for each in response.facade.bays}
+    assert set(response.known) == {bay.bay.name for bay in response.facade.bays}
 
 
 @pytest.mark.parametrize(("engine", "known"), [(CUT, False), (WHOLE, True)])

@@ -79,7 +79,7 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -
     below = LevelOfProtection.BELOW_STANDARDS
     assert found.verdict_word(below) == "COMPLIES (flagged)"
     assert replace(found, unchecked=()).is_flagged == any(
-        not each for each in found.responses[0].known.values()
+        not case for case in found.responses[0].known.values()
     )
     unprotected = Consequences((replace(found.responses[0], known={}),))
     assert unprotected.verdict_word(below) == "COMPLIES"
@@ -124,7 +124,7 @@ def test_pieces_that_fall_in_time_are_taken_away(found: Consequences) -> None:
     (barrier,) = gone.barriers
     assert barrier.taken_away == WALL[:2]
     assert list(barrier.pieces["piece"]) == ["post_x4.250_y4.750"]
-    peaks = [each.responses[0].facade.pressure_pa.max() for each in (gone, found)]
+    peaks = [case.responses[0].facade.pressure_pa.max() for case in (gone, found)]
     assert peaks[0] > peaks[1]
 
 

@@ -122,4 +122,6 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
 def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> None:
     inside = [LoadCase(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
     with pytest.raises(ScenarioError, match="building"):
-        BlastEvaluator(COURTYARD, "event").loads_of_many([((), each) for each in inside], processes)
+        BlastEvaluator(COURTYARD, "event").loads_of_many(
+            [((), loadcase) for loadcase in inside], processes
+        )

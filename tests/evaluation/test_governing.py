@@ -16,7 +16,7 @@ def test_levels_come_before_damage_and_damage_before_loads() -> None:
         Severity(4, 2.0, 1.0),
         Severity(4, 2.0, 5.0),
     ]
-    assert max(reversed(ordered), key=lambda each: each) == ordered[-1]
+    assert max(reversed(ordered), key=lambda response: response) == ordered[-1]
     assert sorted(ordered) == ordered
 
 
@@ -32,7 +32,7 @@ def test_of_buildings_below_standards_the_one_with_more_damage_governs_then_more
     one, every = low.copy(), np.full(len(bays), 5e6)
     one[0] = 5e6
     some, more, most = (response(peaks) for peaks in (one, every, 2.0 * every))
-    assert len({each.facade.level_of_protection for each in (some, more, most)}) == 1
+    assert len({response.facade.level_of_protection for response in (some, more, most)}) == 1
     assert some.severity.damage < more.severity.damage <= most.severity.damage
-    assert max([some, more, most], key=lambda each: each.severity) is most
-    assert max([some, response(low)], key=lambda each: each.severity) is some
+    assert max([some, more, most], key=lambda response: response.severity) is most
+    assert max([some, response(low)], key=lambda case: case.severity) is some

@@ -87,8 +87,8 @@ def test_words() -> None:
     assert Number.share(0.485).text() == "48.5 %"
     assert Number(1234.56, "Pa s", 12.34).text() == "1,235 Pa s +- 12"
     assert Number(-0.01234, error=0.00056).text(TYPOGRAPHIC) == "\N{MINUS SIGN}0.0123 ± 0.00056"
-    assert [Number(each).text() for each in (0.0, 99.96, float("nan"))] == ["0", "100.0", "-"]
-    assert [percent(each) for each in (-4e-4, -6e-4, float("nan"))] == ["0.0 %", "-0.1 %", "-"]
+    assert [Number(case).text() for case in (0.0, 99.96, float("nan"))] == ["0", "100.0", "-"]
+    assert [percent(case) for case in (-4e-4, -6e-4, float("nan"))] == ["0.0 %", "-0.1 %", "-"]
 
 
 def test_final_statements_have_it_beside_each_number() -> None:
@@ -102,7 +102,7 @@ def test_final_statements_have_it_beside_each_number() -> None:
         ]
         for layout in (WALL, ())
     )
-    gone = [reductions(*each).item() for each in zip(protected, unprotected, strict=True)]
+    gone = [reductions(*case).item() for case in zip(protected, unprotected, strict=True)]
     (row,) = evaluation.table.to_dict("records")
     assert row["reduction_error"] == pytest.approx(convergence_index(*gone))
     assert row["impulse_error_pa_s"] == pytest.approx(convergence_index(*protected))
@@ -129,7 +129,7 @@ def test_several_cases_have_that_of_the_worst_charge() -> None:
     document["charge"][0]["tnt_kg"] = 2.0
     light = hut().from_document(document, "light")
     evaluators = Evaluators(GasEngine(cell_m=0.25, border_m=0.0))
-    cases = [LoadCaseSet(each, draw_threats(each, [0])) for each in (light, hut())]
+    cases = [LoadCaseSet(case, draw_threats(case, [0])) for case in (light, hut())]
     found = compare(evaluators, cases, [WALL, WALL], with_error=True)
     assert found.grid_error is not None
     assert found.every[1].coarse is not None

@@ -42,7 +42,7 @@ def measured() -> tuple[dict[str, float], dict[str, float]]:
     """Impulse (Pa s) and peak (Pa) on the hut without and with the wall, under the near threat."""
     loads = BlastEvaluator(hut(), "gas").loads_of_many([((), NEAR), (WALL, NEAR)])
     unprotected, protected = (
-        {"impulse": each.protected_impulse_pa_s, "peak": each.protected_peak_pa} for each in loads
+        {"impulse": load.protected_impulse_pa_s, "peak": load.protected_peak_pa} for load in loads
     )
     return unprotected, protected
 
@@ -158,7 +158,7 @@ def test_totals_are_printed_with_the_unit_of_what_counts() -> None:
     evaluator = BlastEvaluator(site(quantity="peak"), "gas")
     evaluation = evaluate_against(evaluator, WALL, draw_threats(evaluator.scenario, [0]))
     lines = means(evaluation, evaluator.scenario.objective)
-    printed = "\n".join(each.text() for each in lines)
+    printed = "\n".join(line.text() for line in lines)
     assert f"without barrier: mean {evaluation.unprotected_load:,.0f} Pa," in printed
     assert "psi s" not in printed
 
@@ -178,7 +178,7 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     measured: tuple[dict[str, float], dict[str, float]],
 ) -> None:
     own = hut().model_copy(update={"objective": Cracking()})
-    unprotected, protected = (each["impulse"] - 100.0 for each in measured)
+    unprotected, protected = (value["impulse"] - 100.0 for value in measured)
     assert protected > 0.0
     evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
     assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((unprotected, protected))

@@ -70,11 +70,11 @@ def test_scaled_histories_are_those_of_a_blast_of_that_mass(
     """On the bays with a tenth of the largest impulse or more."""
     mass_kg = share * CHARGE.tnt_kg
     blast, scaled = (
-        each.responses[0].on_cells
-        for each in (judge(mass_kg), scaled_to(found, CHARGE._replace(tnt_kg=mass_kg)))
+        case.responses[0].on_cells
+        for case in (judge(mass_kg), scaled_to(found, CHARGE._replace(tnt_kg=mass_kg)))
     )
     of_blast, of_scaled = (
-        impulses(each.time_s, each.pressure_pa).max(axis=1) for each in (blast, scaled)
+        impulses(case.time_s, case.pressure_pa).max(axis=1) for case in (blast, scaled)
     )
     counts = of_blast > 0.1 * of_blast.max()
     assert np.abs(of_scaled / of_blast - 1.0)[counts].max() < 0.1
@@ -86,7 +86,7 @@ def test_an_index_is_the_share_of_the_variance_that_a_quantity_explains() -> Non
     alone = np.where(quantiles[:, 0] < 0.7, 3, 2)
     together = np.where((quantiles[:, 0] < 0.5) == (quantiles[:, 1] < 0.5), 3, 2)
     level = LevelOfProtection.MEDIUM
-    of_alone, of_both = (LevelProbability(each, quantiles) for each in (alone, together))
+    of_alone, of_both = (LevelProbability(case, quantiles) for case in (alone, together))
     assert of_alone.drivers(level)["charge"] > 0.9
     assert max(of_both.drivers(level).values()) < 0.05
     assert of_alone.words(level).startswith("'medium' with 0.7")
@@ -118,7 +118,7 @@ def test_in_the_shade_of_a_wall_loads_are_less_certain(found: Consequences) -> N
     unprotected = replace(found.responses[0], site=replace(site, structures=site.structures[:1]))
     assert unprotected.places.seen.tolist() == [True, True, *[False] * (len(places.seen) - 2)]
     shaded, seen = (
-        level_probability(replace(found, responses=(each,)), replace(CERTAIN, in_shade=0.5), 200)
-        for each in (found.responses[0], unprotected)
+        level_probability(replace(found, responses=(case,)), replace(CERTAIN, in_shade=0.5), 200)
+        for case in (found.responses[0], unprotected)
     )
     assert shaded.of(LevelOfProtection.LOW) < seen.of(LevelOfProtection.LOW)

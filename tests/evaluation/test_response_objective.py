@@ -54,10 +54,10 @@ def test_loads_with_measures_are_those_of_a_blast_with_them(evaluator: BlastEval
     histories = peak_corrected(own.time_s, own.pressure_pa, peak_factor(0.5, THREAT.charge.tnt_kg))
     sharp = respond(own.bays, *histories)
     damage = np.zeros(len(own.bays))
-    for each in (own, sharp):
-        damage[each.glazed] = np.maximum(damage[each.glazed], each.glazing.hazard)
-        damage[each.walled] = np.maximum(damage[each.walled], each.walls.damage)
-    area_m2 = np.array([each.bay.area_m2 for each in own.bays])
+    for bay in (own, sharp):
+        damage[bay.glazed] = np.maximum(damage[bay.glazed], bay.glazing.hazard)
+        damage[bay.walled] = np.maximum(damage[bay.walled], bay.walls.damage)
+    area_m2 = np.array([bay.bay.area_m2 for bay in own.bays])
     loads = evaluator.loads((TAKEN,), THREAT)
     assert loads.load(DAMAGE.objective) == pytest.approx(area_m2 @ damage / area_m2.sum())
     assert loads.level == min(own.level_of_protection, sharp.level_of_protection)
@@ -82,7 +82,7 @@ def test_with_a_target_the_cheapest_layout_that_reaches_it_is_worth_most() -> No
     assert objective.response(damage, area_m2) == pytest.approx((1.0 + 2.0 * 2.5) / 4.0)
     assert objective.response(damage[:1], area_m2[:1]) == 0.0
     passes, dearer, fails = (
-        objective.objective_value(*each) for each in ((0, 0.2), (0, 1.0), (1e-6, 0.0))
+        objective.objective_value(*case) for case in ((0, 0.2), (0, 1.0), (1e-6, 0.0))
     )
     assert passes < dearer < fails
 
@@ -107,7 +107,7 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
     assert terminated
     assert paid == pytest.approx(-info["response"])
     assert info["reward_terms"].keys() == {"response", "invalid_actions"}
-    assert info["level_of_protection"] in {each.label for each in LevelOfProtection}
+    assert info["level_of_protection"] in {level.label for level in LevelOfProtection}
     assert env.placement.layout == (TAKEN,)
 
 
@@ -122,8 +122,8 @@ def test_searches_harden_without_spending_blasts_on_it(method: str) -> None:
     assert result.load is not None
     assert result.load < metered.unprotected[0]
     assert result.blasts == metered.blasts <= 30
-    tried = {each.layout for each in result.history}
-    assert any(isinstance(each, Measure) for layout in tried for each in layout)
+    tried = {step.layout for step in result.history}
+    assert any(isinstance(element, Measure) for layout in tried for element in layout)
 
 
 def test_particles_know_no_response() -> None:

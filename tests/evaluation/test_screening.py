@@ -50,7 +50,7 @@ def screened() -> Screening:
 
 
 def test_the_load_of_a_bay_in_sight_is_that_of_its_angle(screened: Screening) -> None:
-    west = next(each for each in screened.threats[0].bays if each.filled.bay.wall == "west")
+    west = next(bay for bay in screened.threats[0].bays if bay.filled.bay.wall == "west")
     assert west.in_sight
     bay = west.filled.bay
     middle_m = np.array([*bay.line.point_at(0.5 * bay.width_m), 1.75])  # type: ignore[union-attr]
@@ -65,7 +65,7 @@ def test_the_load_of_a_bay_in_sight_is_that_of_its_angle(screened: Screening) ->
 
 
 def test_a_bay_out_of_sight_has_the_side_on_load(screened: Screening) -> None:
-    east = next(each for each in screened.threats[0].bays if each.filled.bay.wall == "east")
+    east = next(bay for bay in screened.threats[0].bays if bay.filled.bay.wall == "east")
     assert not east.in_sight
     side_on = kingery_bulmash("incident_overpressure", east.distance_m, 5.0)
     assert east.peak_pa == pytest.approx(side_on, rel=1e-9)
@@ -83,7 +83,7 @@ def test_slanting_peaks_keep_no_limit_by_the_rule_of_impulses() -> None:
     )
     del document["build_zone"]
     (threat,) = screen(Scenario.from_document(document, "aside")).threats
-    (bay,) = (each for each in threat.bays if each.filled.bay.wall == "west")
+    (bay,) = (bay for bay in threat.bays if bay.filled.bay.wall == "west")
     assert 122e3 < bay.peak_pa < 141e3  # half a metre before the wall
     assert not threat.keeps(Requirement.parsed("peak 95"))
 
@@ -136,9 +136,9 @@ def test_requirements_name_one_scale() -> None:
     bay = FilledBay(Bay("hut", "west", 1, 1, 0.0, 3.0, 0.0, 3.5), wall=catalogue()["brick_215"])  # type: ignore[arg-type]
     pushed = respond([bay], np.array([0.0, 0.02]), np.array([[200e3, 0.0]]))
     kept = ("gsa 1", "peak 201", "impulse 2001")
-    assert all(Requirement.parsed(each).kept_by(pushed) for each in kept)
+    assert all(Requirement.parsed(name).kept_by(pushed) for name in kept)
     broken = ("low", "peak 199", "impulse 1999")
-    assert not any(Requirement.parsed(each).kept_by(pushed) for each in broken)
+    assert not any(Requirement.parsed(name).kept_by(pushed) for name in broken)
     for wrong in ("gsa 4", "peak -1", "meduim"):
         with pytest.raises(BlastEnvError):
             Requirement.parsed(wrong)
@@ -173,9 +173,9 @@ def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> No
         place | {"threat": "parcel", "mass_kg": 2.0, "explosive": "c4"},
     ]
     site = Scenario.from_document(document, "yard")
-    assert [each.tnt_kg for each in site.charge] == [227.0, pytest.approx(2.74)]
-    assert [each.name for each in screen(site).threats] == ["car", "parcel"]
-    unnamed = [{**each.model_dump(), "threat": None} for each in site.charge]
+    assert [source.tnt_kg for source in site.charge] == [227.0, pytest.approx(2.74)]
+    assert [threat.name for threat in screen(site).threats] == ["car", "parcel"]
+    unnamed = [{**source.model_dump(), "threat": None} for source in site.charge]
     unprotected = Scenario.from_document(site.model_dump() | {"charge": unnamed}, "yard")
     assert unprotected.content_hash == site.content_hash
     document["charge"] = [place | {"mass_kg": 2.0, "explosive": "c5"}]

@@ -62,23 +62,23 @@ def fine_blasts() -> dict[str, GasResult]:
     engine, charge = GasEngine(cell_m=0.25), Charge((1.5, 4.0), 13.0)
     layouts: dict[str, Layout] = {"bare": (), "wall": WALL[:3]}
     return {
-        name: GasBlast(scenario, each, engine=engine, charge=charge).run()
-        for name, each in layouts.items()
+        name: GasBlast(scenario, layout, engine=engine, charge=charge).run()
+        for name, layout in layouts.items()
     }
 
 
 def test_the_load_on_a_structure_stands_by_the_walls_that_count(
     fine_blasts: dict[str, GasResult],
 ) -> None:
-    found = {name: each.validation(["hut"]) for name, each in fine_blasts.items()}
+    found = {name: fine_blast.validation(["hut"]) for name, fine_blast in fine_blasts.items()}
     assert found["bare"].status is ValidationStatus.MEASURED
     assert found["wall"].status is ValidationStatus.VERIFIED
     assert "of it in the shade" in found["wall"].reason  # the wall is half as wide
-    for name, each in fine_blasts.items():
-        (load,), (row,) = each.structure_loads, each.structures.to_dict("records")
+    for name, fine_blast in fine_blasts.items():
+        (load,), (row,) = fine_blast.structure_loads, fine_blast.structures.to_dict("records")
         assert load.validation == found[name]
         assert (row["validation"], row["reason"]) == (found[name].status.label, found[name].reason)
-        assert each.buildings["validation"].tolist() == [row["validation"]]
+        assert fine_blast.buildings["validation"].tolist() == [row["validation"]]
 
 
 def test_an_evaluation_has_the_worst_validation_of_its_threats() -> None:

@@ -59,11 +59,11 @@ def test_the_mechanism_is_the_same_for_all_that_judge_layouts(evaluation: Evalua
 def test_more_threats_than_places_meet_the_worst_ones_again_and_cost_nothing() -> None:
     evaluator = BlastEvaluator(SITE, GAS)
     threats = draw_threats(SITE, range(5))
-    ranks = [each.charge.rank for each in threats if isinstance(each.charge, VehicleCharge)]
+    ranks = [threat.charge.rank for threat in threats if isinstance(threat.charge, VehicleCharge)]
     assert ranks == list(range(5))
     loads = evaluator.loads_of_many([(POSTS, threat) for threat in threats])
     assert evaluator.counts.blasts == 2
-    impulses = np.array([each.protected_impulse_pa_s for each in loads])
+    impulses = np.array([load.protected_impulse_pa_s for load in loads])
     assert (impulses[[0, 1, 0, 1, 0]] == impulses).all()
 
 
@@ -85,7 +85,7 @@ def test_a_search_meets_the_worst_places_first() -> None:
     road = {"kind": "segment", "start_m": [2.0, 2.0], "end_m": [2.0, 6.0], "tnt_kg": 5.0}
     both = gate_site(charge=[vehicle_document(), road])
     threats = search_set(both, None, 1, seed=0, charges=12).threats
-    vehicles = [each.charge for each in threats if isinstance(each.charge, VehicleCharge)]
+    vehicles = [threat.charge for threat in threats if isinstance(threat.charge, VehicleCharge)]
     assert 0 < len(vehicles) < 12
-    assert [each.charge for each in threats[: len(vehicles)]] == vehicles
-    assert [each.rank for each in vehicles] == list(range(len(vehicles)))
+    assert [threat.charge for threat in threats[: len(vehicles)]] == vehicles
+    assert [vehicle.rank for vehicle in vehicles] == list(range(len(vehicles)))

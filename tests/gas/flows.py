@@ -124,5 +124,5 @@ def face_loads(_: GasGrid, faces: int) -> list[FaceLoads]:
 
 def recorder(solver: GasSolver, kind: type[Kind]) -> Kind:
     """Return the recorder of this kind."""
-    (found,) = (each for each in solver.recorders if isinstance(each, kind))
+    (found,) = (recorder for recorder in solver.recorders if isinstance(recorder, kind))
     return found

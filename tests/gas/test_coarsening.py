@@ -95,9 +95,9 @@ def test_the_skirt_stays_where_it_is() -> None:
     grid = with_double_cells(fine)
     assert grid.buffer_layers == fine.buffer_layers - 1
     for axis in range(3):
-        low, high = (1.0 / each.narrowness(axis)[2:-2] for each in (fine, grid))
+        low, high = (1.0 / case.narrowness(axis)[2:-2] for case in (fine, grid))
         assert fine.cell_m * low.sum() == pytest.approx(grid.cell_m * high.sum())
-    fine_z, coarse_z = ((1.0 / each.narrowness(2))[2:-2] for each in (fine, grid))
+    fine_z, coarse_z = ((1.0 / case.narrowness(2))[2:-2] for case in (fine, grid))
     assert (coarse_z[-5:] * 2.0 == fine_z[-5:]).all()
     assert grid.origin_m == (-1.0, -1.0, 0.0)
 

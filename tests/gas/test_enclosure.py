@@ -21,14 +21,14 @@ WALLS = {
 def room(*walls: str, tnt_kg: float = 0.965, at_m: tuple[float, float] = (9.0, 9.0)) -> Scenario:
     """Return a site with a slab over some walls; the east wall always stands."""
     roof: Document = block("roof", 6.0, 5.5, 14, 16, **SLAB)
-    parts = [WALLS[each] for each in dict.fromkeys([*walls, "east"])]
+    parts = [WALLS[wall] for wall in dict.fromkeys([*walls, "east"])]
     charge = point(*at_m, tnt_kg, height_m=1.0)
     return site("room", (20.0, 18.0, 8.0), charge, roof, *parts)
 
 
 def room_notes(scenario: Scenario) -> list[str]:
     notes = GasBlast(scenario, engine=GasEngine(until=0.001)).run().impulse("east").notes
-    return [each for each in notes if "under a roof within walls" in each]
+    return [note for note in notes if "under a roof within walls" in note]
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_closed_room_states_the_gas_pressure_that_the_source_lacks(
     assert "of 126 m3" in note
     found = re.search(r"gives (\d+) kPa, the source (\d+) kPa", note)
     assert found is not None
-    assert [float(each) for each in found.groups()] == pytest.approx(
+    assert [float(group) for group in found.groups()] == pytest.approx(
         [burnt_kpa, known_kpa], rel=0.03
     )
 

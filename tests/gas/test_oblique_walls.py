@@ -29,14 +29,14 @@ def hall(outline_m: list[tuple[float, float]], **keys: Any) -> Scenario:
 def test_only_buildings_with_oblique_walls_are_stepped() -> None:
     assert stepped_buildings(turned_block(20.0).structures) == {"block"}
     sites = [turned_block(0.0), office_park(), *map(load_scenario, bundled_scenarios())]
-    assert [stepped_buildings(each.structures) for each in sites] == [frozenset()] * len(sites)
+    assert [stepped_buildings(site.structures) for site in sites] == [frozenset()] * len(sites)
 
 
 def test_tables_and_notes_say_it() -> None:
     engine = GasEngine(border_m=0.0, until=0.01)
-    found = [GasBlast(hall(each), engine=engine).run() for each in (SLANTED, STRAIGHT)]
-    assert [each.buildings["stepped"].tolist() for each in found] == [[True], [False]]
-    assert [each.stepped_notes for each in found] == [(f"hall: {STEPPED}",), ()]
+    found = [GasBlast(hall(case), engine=engine).run() for case in (SLANTED, STRAIGHT)]
+    assert [consequence.buildings["stepped"].tolist() for consequence in found] == [[True], [False]]
+    assert [consequence.stepped_notes for consequence in found] == [(f"hall: {STEPPED}",), ()]
 
 
 def test_an_assessment_says_it_of_a_building_with_a_facade() -> None:
@@ -61,7 +61,7 @@ def straight() -> GasResult:
 
 def test_the_load_is_that_of_a_straight_block(turned: GasResult, straight: GasResult) -> None:
     """The same block at the same place before the charge: 2 % apart, as cells resolve it."""
-    loads = [each.impulse("block").pa_s for each in (turned, straight)]
+    loads = [case.impulse("block").pa_s for case in (turned, straight)]
     assert loads[0] == pytest.approx(loads[1], rel=0.04)
 
 
@@ -107,7 +107,7 @@ def test_means_are_over_the_area_of_the_real_walls(turned: GasResult) -> None:
     for table in (turned.structures, turned.walls[turned.walls["counts"]], turned.buildings):
         load, area = table["impulse_pa_s"], table["area_m2"]
         assert (load * area).sum() == pytest.approx(momentum, rel=1e-12)
-    loads = {each.name: each.impulse_pa_s for each in turned.loads().structures}
+    loads = {structure.name: structure.impulse_pa_s for structure in turned.loads().structures}
     of_structures_pa_s = turned.structures.set_index("structure")["impulse_pa_s"]
     assert loads == pytest.approx(of_structures_pa_s.to_dict())
 
@@ -145,5 +145,5 @@ def test_a_rectangle_is_the_plain_case_of_a_polygon(straight: GasResult) -> None
     assert found.digest == straight.digest
     for one, other in zip(found.loads().structures, straight.loads().structures, strict=True):
         assert one == other
-    own = [each.bays.sort_values(["wall", "impulse_pa_s"]) for each in (found, straight)]
+    own = [case.bays.sort_values(["wall", "impulse_pa_s"]) for case in (found, straight)]
     assert own[0]["impulse_pa_s"].tolist() == own[1]["impulse_pa_s"].tolist()

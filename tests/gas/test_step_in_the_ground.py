@@ -44,7 +44,7 @@ def loads_on(
     """Return impulse and peak on each face of a building (2, n), of 5 kg on a site 30 m long."""
     x_m, y_m, height_m = charge_m
     source = point(x_m, y_m, 5.0, height_m=height_m)
-    grounds = (each | {"carries": True} for each in terraces)
+    grounds = (terrace | {"carries": True} for terrace in terraces)
     scenario = builders.site("step", (30.0, 16.0, air_m), source, building, *grounds)
     site = build_site(scenario)
     run = GasRun(GasSettings(border_m=0.0, until=until_s), site)
@@ -52,7 +52,7 @@ def loads_on(
     own = run.table.structure == 0
     order = np.lexsort((*run.table.centre_m[own].T, run.table.face[own]))
     loads = run.loads.impulse_pa_s, run.loads.peak_pa
-    return np.stack([each[own][order] for each in loads])
+    return np.stack([load[own][order] for load in loads])
 
 
 def test_a_far_terrace_is_felt_by_nothing_that_counts() -> None:

@@ -94,7 +94,7 @@ def test_every_layout_that_can_be_placed_comes_back(
 ) -> None:
     placement = LayoutState.empty(scenario())
     for _ in range(random.randint(0, 12)):
-        free = list(zip(*(each.tolist() for each in placement.free.nonzero()), strict=True))
+        free = list(zip(*(index.tolist() for index in placement.free.nonzero()), strict=True))
         placement = placement.place(random.choice(free))
     path = tmp_path_factory.getbasetemp() / "placed_layout.json"
     write_layout(path, scenario(), placement.cells, provenance)

@@ -116,9 +116,9 @@ def test_placing_leaves_the_placement_as_it_was() -> None:
 @pytest.mark.parametrize("name", ["free", "usable", "module_costs"])
 def test_arrays_are_read_only(name: str) -> None:
     placement = LayoutState.of(zone_scenario(), [(0, 0)])
-    for each in (placement, pickle.loads(pickle.dumps(placement))):
+    for case in (placement, pickle.loads(pickle.dumps(placement))):
         with pytest.raises(ValueError, match="read-only"):
-            getattr(each, name)[0, 0] = 1
+            getattr(case, name)[0, 0] = 1
 
 
 def test_placement_survives_pickling_and_copying() -> None:

@@ -85,9 +85,11 @@ def test_maskable_ppo_learns_by_item_and_block_in_a_zone_of_a_hundred_metres() -
     )
     assert env.action_space == gym.spaces.Discrete(4 + 84 + 64 + 1)
     model = MaskablePPO("MlpPolicy", env, policy_kwargs=_POLICY, **{**_SMALL, "n_steps": 32})
-    before = {name: each.clone() for name, each in model.policy.state_dict().items()}
+    before = {name: value.clone() for name, value in model.policy.state_dict().items()}
     model.learn(64)
-    changed = [not (each == before[name]).all() for name, each in model.policy.state_dict().items()]
+    changed = [
+        not (value == before[name]).all() for name, value in model.policy.state_dict().items()
+    ]
     assert any(changed)
     observation, info = env.reset(seed=0)
     choices = set()

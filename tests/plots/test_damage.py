@@ -46,7 +46,7 @@ def site() -> Scenario:
 def response(site: Scenario, peak_pa: float) -> FacadeResponse:
     """Return what a triangle of 10 ms does to the western bay; the others are not loaded."""
     time_s = np.array([0.0, 0.01, 0.02])
-    loads = [peak_pa if each.bay.wall == "west" else 0.0 for each in site.bays]
+    loads = [peak_pa if bay.bay.wall == "west" else 0.0 for bay in site.bays]
     return respond(site.bays, time_s, np.outer(loads, [1.0, 0.0, 0.0]))
 
 
@@ -61,10 +61,10 @@ def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> 
     """Four walls of a bay with two panes each; in the west the panes fly, and the wall holds."""
     figure = facade_picture(both(site), "hut")
     unprotected, protected = (
-        [each for each in plot.patches if isinstance(each, Rectangle)] for plot in figure.axes
+        [patch for patch in plot.patches if isinstance(patch, Rectangle)] for plot in figure.axes
     )
     for patches, panes in ((unprotected, WORST), (protected, BEST)):
-        colours = [tuple(each.get_facecolor()[:3]) for each in patches]
+        colours = [tuple(patch.get_facecolor()[:3]) for patch in patches]
         assert len(colours) == 4 * 3
         assert colours.count(to_rgb(panes)) >= 2
     assert "level of protection below standards" in figure.axes[0].get_title("left")
@@ -76,7 +76,7 @@ def test_a_bay_with_better_glass_is_in_the_diagram_of_that_glass(site: Scenario)
     better = find_component("window_laminated_12")
     assert isinstance(better, Glazing)
     unprotected = response(site, 4e4)
-    bays = [replace(each, glazing=better) for each in site.bays]
+    bays = [replace(bay, glazing=better) for bay in site.bays]
     hardened = respond(bays, unprotected.time_s, unprotected.pressure_pa)
     figure = pressure_impulse_diagram([("nothing", unprotected), ("laminated", hardened)], "hut")
     counts = {
@@ -138,8 +138,8 @@ def test_a_map_of_risks_has_a_region_and_a_circle_a_threshold(site: Scenario) ->
     unprotected, protected = (blast.run(recorders=ground_recorders) for blast in blasts)
     figure = threshold_map(protected, beside=unprotected)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert any(each.startswith("windows usually shattered: from 3.4 kPa, ") for each in words)
+    assert any(word.startswith("windows usually shattered: from 3.4 kPa, ") for word in words)
     for axes in figure.axes:
-        circles = [each for each in axes.patches if isinstance(each, Circle)]
-        radii = [each.get_radius() for each in circles if each.get_linestyle() != "-"]
+        circles = [patch for patch in axes.patches if isinstance(patch, Circle)]
+        radii = [circle.get_radius() for circle in circles if circle.get_linestyle() != "-"]
         assert radii[-3:] == sorted(radii[-3:], reverse=True)

@@ -40,12 +40,14 @@ def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
     figure: Figure, evaluation: Evaluation
 ) -> None:
     plan = figure.axes[0]
-    circles, squares = (each for each in plan.collections if isinstance(each, PathCollection))
+    circles, squares = (
+        collection for collection in plan.collections if isinstance(collection, PathCollection)
+    )
     drawn = {
         tuple(place): share
-        for each in (circles, squares)
+        for case in (circles, squares)
         for place, share in zip(
-            np.asarray(each.get_offsets()).tolist(), np.asarray(each.get_array()), strict=True
+            np.asarray(case.get_offsets()).tolist(), np.asarray(case.get_array()), strict=True
         )
     }
     expected = {o.charge.position_m: 100.0 * o.reduction for o in evaluation.outcomes}
@@ -118,8 +120,8 @@ def test_the_parts_of_a_building_have_one_load() -> None:
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
     figure = evaluation_picture(found)
     assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
-    words = [each.get_text() for axes in figure.axes for each in axes.texts]
-    assert not any("calibration" in each for each in words)
+    words = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert not any("calibration" in word for word in words)
     table = found.table.set_index("structure")
     (hall,) = found.building_table.to_dict("records")
     assert (hall["structure"], hall["weight"], hall["protected"]) == ("hall", 1.0, True)

@@ -87,12 +87,12 @@ def test_a_blast_without_hits_can_be_drawn(result: BlastResult) -> None:
 
 def test_the_parts_of_a_building_are_one_on_the_heat_map(blast: Blast) -> None:
     document = blast.scenario.model_dump(mode="json", exclude_none=True)
-    for each in document["structures"]:
-        each["building"] = "town"
+    for structure in document["structures"]:
+        structure["building"] = "town"
     joined = replace(blast, scenario=Scenario.from_document(document, "joined")).run()
     figure = heat_map(joined)
     title, *_ = (axes.get_title() for axes in figure.axes[1:])
-    count = sum(each.hits for each in joined.obstacles if each.cells is None)
+    count = sum(obstacle.hits for obstacle in joined.obstacles if obstacle.cells is None)
     assert title.startswith("town (protected)\n")
     assert f"{count} hits" in title
     assert len(figure.axes) == 3  # the site, the building, the bar
@@ -130,11 +130,11 @@ def test_a_load_spread_evenly_over_the_seen_width_is_that_of_the_structure(
     unprotected: BlastResult,
 ) -> None:
     unit = unprotected.load_unit
-    (building,) = (each for each in unprotected.obstacles if each.protected)
+    (building,) = (obstacle for obstacle in unprotected.obstacles if obstacle.protected)
     pa_s = unprotected.impulse(building.name).pa_s
     width_m = seen_width_m(building.rectangle_m, unprotected.blast.scene.charge.position_m)
-    each = building.impulse * MODULE_SIDE_M / width_m
-    assert unit.factor * each == pytest.approx(pa_s)
+    per_module = building.impulse * MODULE_SIDE_M / width_m
+    assert unit.factor * per_module == pytest.approx(pa_s)
     assert unit.of_structure(building) == f"{pa_s:,.0f} Pa s"
 
 
@@ -151,7 +151,7 @@ def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
 ) -> None:
     both = (unprotected, protected)
     scale = LoadScale.of(both)
-    figures = [heat_map(each, both) for each in both]
+    figures = [heat_map(estimate, both) for estimate in both]
     ends = [figure.axes[-1].get_ylim() for figure in figures]
     assert ends[0] == ends[1] == (0.0, scale.full)
     assert scale.full == nice_ceiling(scale.full)
@@ -165,7 +165,7 @@ def test_films_beside_each_other_say_each_blast_s_own_load(
 ) -> None:
     """The law of a calibration is no straight line: one factor for both would be wrong."""
     shared = unprotected.load_unit.with_loads_of(protected.load_unit)
-    (building,) = (each for each in protected.obstacles if each.protected)
+    (building,) = (obstacle for obstacle in protected.obstacles if obstacle.protected)
     assert shared.of_structure(building) == f"{protected.impulse('building').pa_s:,.0f} Pa s"
     assert unprotected.load_unit.of_structure(building) != shared.of_structure(building)
     assert (shared.factor, shared.label) == (

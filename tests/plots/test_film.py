@@ -122,8 +122,8 @@ def test_two_blasts_in_one_film_are_shown_to_the_end_of_the_longer_one(
     path = tmp_path / "both.mp4"
     results = write(blast, barrier_blast, path)
     frames = frames_of(path)
-    assert [each.digest for each in results] == [blast.run().digest, barrier_blast.run().digest]
-    plans = [plan_until(shown_until_s(each), 5.0, 40.0) for each in results]
+    assert [result.digest for result in results] == [blast.run().digest, barrier_blast.run().digest]
+    plans = [plan_until(shown_until_s(result), 5.0, 40.0) for result in results]
     assert len(frames) == max(plan.frame_count for plan in plans) > 3
     assert frames.shape[2] == WIDTH_PX
     assert frames.shape[1] % 2 == 0

@@ -150,7 +150,7 @@ def test_a_destroyed_module_looks_different(blast: Blast) -> None:
 def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
     blast: Blast, barrier_blast: Blast
 ) -> None:
-    one, other = (FramePainter(each).scale.full for each in (blast, barrier_blast))
+    one, other = (FramePainter(case).scale.full for case in (blast, barrier_blast))
     assert one == other > 0.0
 
 

@@ -61,7 +61,7 @@ def protected(barrier_blast: GasBlast) -> GasResult:
 
 @pytest.fixture(scope="module")
 def shots(blast: GasBlast, barrier_blast: GasBlast) -> list[PressureShot]:
-    return [record_planes(each, CUT, height_m=HEIGHT_M) for each in (blast, barrier_blast)]
+    return [record_planes(case, CUT, height_m=HEIGHT_M) for case in (blast, barrier_blast)]
 
 
 def images_of(figure: Figure) -> list[AxesImage]:
@@ -156,7 +156,7 @@ def test_a_map_needs_its_recorder(blast: GasBlast, protected: GasResult) -> None
     run = replace(blast, engine=GasEngine(margin_m=1.0, until=1e-3)).run()
     with pytest.raises(BlastEnvError, match="recorders=ground_recorders"):
         ground_map(run)
-    assert any(isinstance(each, GroundMap) for each in protected.run.solver.recorders)
+    assert any(isinstance(recorder, GroundMap) for recorder in protected.run.solver.recorders)
     with pytest.raises(UnknownNameError, match="did you mean 'peak'"):
         ground_map(protected, "peek")
 
@@ -201,7 +201,7 @@ def test_a_building_of_two_parts_is_unfolded_as_one(
     for images in zip(*(map(images_of, map(facades, (unprotected, halves)))), strict=True):
         one, two = map(values_of, images)
         np.testing.assert_array_equal(one, two)
-    words = {facades(each).get_suptitle() for each in (unprotected, halves)}
+    words = {facades(case).get_suptitle() for case in (unprotected, halves)}
     assert all("walls of hut" in text for text in words)
     assert len(values_of(images_of(facades(halves, "north_half"))[0])[0]) == part["rows"]
 

@@ -76,7 +76,7 @@ def test_a_new_condition_of_the_zone_is_in_all_pictures_and_drawings() -> None:
     plan = LayoutPlan(site, ())
     (outline,) = drawing(plan).modelspace().query('LWPOLYLINE[layer=="SOFT_GROUND"]')
     assert outline.dxf.layer == "SOFT_GROUND"
-    kinds = [each["properties"]["kind"] for each in feature_collection(plan)["features"]]
+    kinds = [feature["properties"]["kind"] for feature in feature_collection(plan)["features"]]
     assert kinds.count("soft_ground") == 1
 
 
@@ -114,8 +114,12 @@ def test_charges_of_a_street_share_a_label_and_no_name_lies_on_another_building(
     document |= {"structures": [block, shed], "charge": points, "gauges": []}
     document["site"] = {"width_m": 64.0, "height_m": 50.0}
     site = Scenario.from_document(document, "street")
-    texts = [each.label for each in blast_env.plots.plan.site_features(site) if each.label]
-    assert [each for each in texts if "kg" in each] == ["15 charges: 100 kg"]
+    texts = [
+        site_feature.label
+        for site_feature in blast_env.plots.plan.site_features(site)
+        if site_feature.label
+    ]
+    assert [text for text in texts if "kg" in text] == ["15 charges: 100 kg"]
     view = PixelView.of(site, 680, 560)
     svg = plan_svg(view, site, (), None)
     (x,) = re.findall(r'<text x="([\d.]+)"[^>]*>a_rather_long_name_of_a_shed<', svg)
@@ -140,15 +144,15 @@ def places_of_texts(
     features = [area_feature(Kinds.STRUCTURE, own, "a structure") for own in owns]
     settled = settled_labels(
         features,
-        [Label(each.name, each) for each in features],
+        [Label(feature.name, feature) for feature in features],
         [size] * len(owns),
-        lambda each: each.bounds_m,
-        lambda each: each.bounds_m if inside else None,
+        lambda label: label.bounds_m,
+        lambda label: label.bounds_m if inside else None,
         within,
         gap=4.0,
         far=inf,
     )
-    return [each.place for each in settled]
+    return [thing.place for thing in settled]
 
 
 @settings(max_examples=50, deadline=None)
@@ -189,7 +193,7 @@ def test_the_ground_is_where_the_vehicle_gets_to() -> None:
     for layout in ((), POSTS):
         expected = vehicle_reach(site, vehicle_of(site), layout).ground(16, 28)
         features = vehicle_features(site, layout)
-        reached = [each.bounds_m for each in features if each.kind is Kinds.REACHED]
+        reached = [feature.bounds_m for feature in features if feature.kind is Kinds.REACHED]
         y, x = (0.5 * (np.argwhere(expected).T + 0.5)).tolist()
         assert sum((r.right - r.left) * (r.top - r.bottom) for r in reached) == 0.25 * len(x)
         for place in zip(x, y, strict=True):
@@ -202,8 +206,8 @@ def test_the_stand_off_has_its_length_to_the_nearest_wall() -> None:
         (POSTS, "stand-off 7.0 m", ((3.0, 4.0), (10.0, 4.0))),
     ):
         features = vehicle_features(gate_site(), layout)
-        (line,) = (each for each in features if each.kind is Kinds.STAND_OFF)
-        (star,) = (each for each in features if each.kind is Kinds.CHARGE)
+        (line,) = (feature for feature in features if feature.kind is Kinds.STAND_OFF)
+        (star,) = (feature for feature in features if feature.kind is Kinds.CHARGE)
         assert (line.label, line.places_m) == (label, ends)
         assert star.places_m == ends[:1]
 
@@ -258,9 +262,9 @@ def test_a_polygon_has_one_outline() -> None:
     site = Scenario.from_document(document, "yard")
     (plan,) = site_picture(site).axes
     (silo,) = (
-        each.get_path()
-        for each in plan.patches
-        if isinstance(each, PathPatch) and each.get_zorder() == Kinds.STRUCTURE.level
+        patch.get_path()
+        for patch in plan.patches
+        if isinstance(patch, PathPatch) and patch.get_zorder() == Kinds.STRUCTURE.level
     )
     ends = np.asarray(silo.vertices).round(6).tolist()
     assert len({tuple(place) for place in ends}) == 8

@@ -40,7 +40,7 @@ YARD = {"kind": "rectangle", "corner_m": [1.0, 1.0], "size_m": [2.0, 1.0], "tnt_
 def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> None:
     scenario = site_with(ROAD, YARD)
     places = other_places(scenario, 3)
-    loads = {each.charge: float(number) for number, each in enumerate(places)}
+    loads = {place.charge: float(number) for number, place in enumerate(places)}
     loads[places[1].charge] = 1e3
 
     def severity(place: LoadCase) -> Severity:
@@ -50,7 +50,9 @@ def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> 
     assert (first.name, second.name) == ("T1", "T2")
     assert (first.charge, second.charge) == (places[1].charge, places[-1].charge)
     assert first.why == ("charge source 1, the worst with the layout of 4 places examined")
-    assert [each.charge for each in chief_threats(places, severity, 1)] == [first.charge]
+    assert [chief_threat.charge for chief_threat in chief_threats(places, severity, 1)] == [
+        first.charge
+    ]
 
 
 @given(st.floats(1.0, 3.0), st.floats(1.0, 7.0), st.floats(1.0, 3.0), st.floats(1.0, 7.0))
@@ -68,18 +70,18 @@ def test_no_place_of_a_street_is_nearer_than_those_looked_at(
     places = other_places(scenario, 1)
     shares = np.linspace(0.0, 1.0, 1000)
     nearest = min(away_m(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares)
-    looked_at_m = min(away_m(*each.charge_against(scenario).position_m) for each in places)
+    looked_at_m = min(away_m(*place.charge_against(scenario).position_m) for place in places)
     assert looked_at_m == pytest.approx(nearest, abs=0.01)
 
 
 def test_other_places_are_spread_over_every_source() -> None:
     site = site_with(ROAD, YARD, ROAD)
     places = other_places(site, 3)
-    along_m = [each.charge_against(site).position_m for each in places[:3]]
+    along_m = [place.charge_against(site).position_m for place in places[:3]]
     assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
     assert 3.0 <= places[3].charge_against(site).position_m[1] <= 5.0  # before the hut
     assert len(places) == 4 + 9  # the second road has the same places, the yard its nearest corner
-    assert {each.charge.tnt_kg for each in places[4:]} == {1.0}
+    assert {place.charge.tnt_kg for place in places[4:]} == {1.0}
 
 
 def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
@@ -92,7 +94,7 @@ def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
     assert place_text(threat, site, POSTS) == (
         "(9.0, 4.0) m without the layout, (3.0, 4.0) m with it"
     )
-    assert len({each.charge_against(site, POSTS) for each in places}) == len(places) == 3
+    assert len({place.charge_against(site, POSTS) for place in places}) == len(places) == 3
 
 
 def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:

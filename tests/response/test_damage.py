@@ -37,12 +37,12 @@ def filled(name: str) -> FilledBay:
 
 
 def alternatives(*names: str) -> Alternatives:
-    each = {name: filled(name) for name in names}
+    bays = {name: filled(name) for name in names}
     return Alternatives(
         BAY.name,
         BAY.structure,
-        {name: bay for name, bay in each.items() if bay.glazing is not None},
-        {name: bay for name, bay in each.items() if bay.wall is not None},
+        {name: bay for name, bay in bays.items() if bay.glazing is not None},
+        {name: bay for name, bay in bays.items() if bay.wall is not None},
     )
 
 
@@ -122,9 +122,9 @@ def test_levels_of_protection() -> None:
 
 
 def test_thresholds_on_the_ground_say_their_source_and_go_up() -> None:
-    peaks = [each.peak_pa for each in ground_thresholds()]
+    peaks = [ground_threshold.peak_pa for ground_threshold in ground_thresholds()]
     assert peaks == sorted(peaks)
-    assert all("19" in each.source for each in ground_thresholds())
+    assert all("19" in ground_threshold.source for ground_threshold in ground_thresholds())
     for share in (0.01, 0.5, 0.99):
         found = eardrum_rupture_probability(np.array([eardrum_peak_pa(share)]))
         assert found.item() == pytest.approx(share)

@@ -115,9 +115,9 @@ def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
         histories = np.tile([peak_pa, 0.0, -0.2 * peak_pa, 0.0, 0.0], (3, 1))
         pushed = np.maximum(histories, 0.0)
         found = respond(bays, time_s, histories)
-        panels = [each.wall.panel(3.5) for each in bays if each.wall is not None]
+        panels = [bay.wall.panel(3.5) for bay in bays if bay.wall is not None]
         each_way = [
-            panel_responses(panels, time_s, each[:2]).damage for each in (histories, pushed)
+            panel_responses(panels, time_s, case[:2]).damage for case in (histories, pushed)
         ]
         assert found.walls.damage.tolist() == np.maximum(*each_way).tolist()
         assert respond(bays, time_s, pushed).level_of_protection >= found.level_of_protection
@@ -160,7 +160,7 @@ def test_thin_interlayers_are_named_and_films_are_not() -> None:
     layer = Interlayer(thickness_mm=0.76)
     thin = glazing("window_laminated_6").model_copy(update={"interlayer": layer})
     film = glazing("window_film_6")
-    bays = [FilledBay(bay(), each) for each in (thin, film, glazing("window_laminated_12"))]
+    bays = [FilledBay(bay(), case) for case in (thin, film, glazing("window_laminated_12"))]
     found = respond(bays, np.array([0.0, 0.01]), np.full((3, 2), 100.0))
     assert found.thin_interlayers == (0.76,)
     assert "pane edges" in force_words([found])
@@ -177,9 +177,9 @@ def words_on(
 
 
 def test_a_level_that_rests_on_assumed_properties_names_them() -> None:
-    studs, concrete = (FilledBay(bay(), wall=wall(each)) for each in ("steel_stud", "concrete_200"))
+    studs, concrete = (FilledBay(bay(), wall=wall(name)) for name in ("steel_stud", "concrete_200"))
     plain, laminated = (
-        FilledBay(bay(), glazing(each)) for each in ("window_annealed_6", "window_laminated_12")
+        FilledBay(bay(), glazing(name)) for name in ("window_annealed_6", "window_laminated_12")
     )
     medium = LevelOfProtection.MEDIUM
     calm, hard = (2e3, 10.0), (28e3, 200.0)
@@ -204,6 +204,6 @@ def test_the_heavy_limit_of_concrete_counts_only_between_its_neighbours() -> Non
 
 
 def test_all_interlayers_of_the_catalogue_are_assumed() -> None:
-    layers = [each.interlayer for each in catalogue().values() if isinstance(each, Glazing)]
-    assert all(each.is_assumed for each in layers if each is not None)
+    layers = [case.interlayer for case in catalogue().values() if isinstance(case, Glazing)]
+    assert all(layer.is_assumed for layer in layers if layer is not None)
     assert not Interlayer(tension_n_m=12_000.0).is_assumed

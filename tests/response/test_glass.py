@@ -118,7 +118,7 @@ def test_conditions_of_gsa(flight_m: float, hit_m: float, label: str) -> None:
 
 
 def test_ratings_of_iso_go_with_the_conditions_of_gsa() -> None:
-    assert [each.words for each in GlazingCondition] == [
+    assert [condition.words for condition in GlazingCondition] == [
         *("1, A", "2, B", "3a, D", "3b, E", "4, F", "5, F")
     ]
 
@@ -131,7 +131,7 @@ def test_wrong_panes(sizes: tuple[float, float, float]) -> None:
 
 def test_both_panes_of_double_glazing_bear_the_load() -> None:
     """As one under a slow pressure, too: two equal panes bear twice what one does."""
-    single, double = (Pane(1.5, 1.2, 5.56e-3, outer_thickness_m=each) for each in (0.0, 5.56e-3))
+    single, double = (Pane(1.5, 1.2, 5.56e-3, outer_thickness_m=value) for value in (0.0, 5.56e-3))
     load = double.load_resistance_pa()
     assert load == pytest.approx(2.0 * single.load_resistance_pa())
     assert double.risk(load, 3.0) == pytest.approx(single.risk(0.5 * load, 3.0))

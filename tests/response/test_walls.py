@@ -56,7 +56,9 @@ def test_strength_of_a_simple_panel_by_hand() -> None:
 def test_fixed_ends_give_twice_the_strength_and_the_equivalent_stiffness_of_ufc() -> None:
     """307 E I / L^4 stands for both elastic slopes (UFC 3-340-02, table 3-8)."""
     simple, fixed = (
-        Panel(STEEL, 3.0, each).system.resistance for each in Supports if each != "cantilever"
+        Panel(STEEL, 3.0, support).system.resistance
+        for support in Supports
+        if support != "cantilever"
     )
     assert fixed.cap_pa == pytest.approx(2.0 * simple.cap_pa)
     assert fixed.stiffness_pa_m == pytest.approx(307.0 * 1.2e5 / 81.0, rel=0.01)
@@ -128,7 +130,7 @@ def test_the_stress_of_steel_grows_with_the_rotation_of_the_supports() -> None:
     """UFC 3-340-02, table 4-2, by hand: 420 and 620 MPa."""
     section = ReinforcedConcrete(thickness_m=0.2, steel_pa=420e6, steel_ultimate_pa=620e6)
     yields, ultimate = 1.17 * 420e6, 1.05 * 620e6
-    stresses = [section.design_stress_pa(each) for each in (2.0, 4.0, 8.0)]
+    stresses = [section.design_stress_pa(value) for value in (2.0, 4.0, 8.0)]
     expected = [yields, yields + 0.25 * (ultimate - yields), 0.5 * (yields + ultimate)]
     assert stresses == pytest.approx(expected)
     class_b = ReinforcedConcrete(thickness_m=0.2)
@@ -144,7 +146,7 @@ def test_hardening_and_a_membrane_hold_a_panel_back() -> None:
             {"steel_ultimate_pa": 420e6, "tension_membrane": True},
         )
     )
-    panels = [Panel(each, 3.5) for each in (plain, hard, held)]
+    panels = [Panel(case, 3.5) for case in (plain, hard, held)]
     found = panel_responses(panels, *triangle(400e3, 2000.0, 3))
     assert 8.0 < found.rotation_deg[0] < 30.0
     assert found.rotation_deg[1] < 0.95 * found.rotation_deg[0]
@@ -264,7 +266,7 @@ def test_studs_have_the_limits_of_walls_that_buckle() -> None:
     tied = studs.section.model_copy(update={"ductility": (0.5, 1.0, 2.0, 3.0)})
     names = {"slip": studs, "tied": studs.model_copy(update={"section": tied})}
     found = stand_offs(names, Charge((0.0, 0.0), 100.0))
-    medium_m = [each.distances_m[LevelOfProtection.MEDIUM] for each in found]
+    medium_m = [stand_off.distances_m[LevelOfProtection.MEDIUM] for stand_off in found]
     assert medium_m == pytest.approx([72.0, 58.0], abs=1.0)
     with pytest.raises(ValidationError, match="must ascend"):
         Sheeting(**STEEL.model_dump() | {"ductility": (1.0, 1.0, 2.0, 3.0)})

@@ -179,7 +179,7 @@ def all_documents() -> list[Document]:
         for name in bundled_scenarios()
     ]
     own = [full_document(), tall_document(), driven_document(), minimal_document()]
-    return [*own, *(each for each in bundled if "items" not in each.get("build_zone", {}))]
+    return [*own, *(name for name in bundled if "items" not in name.get("build_zone", {}))]
 
 
 def key_paths(value: object, path: KeyPath = ()) -> Iterator[KeyPath]:

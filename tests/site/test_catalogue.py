@@ -36,7 +36,7 @@ AREA: Document = {"corner_m": (3.5, 2.5), "size_m": (1.0, 1.0), "reason": "duct"
 
 def changed(index: int, **keys: Any) -> list[Document]:
     """Return the items with other keys in one of them."""
-    return [{**each, **(keys if number == index else {})} for number, each in enumerate(ITEMS)]
+    return [{**item, **(keys if number == index else {})} for number, item in enumerate(ITEMS)]
 
 
 TWO_COSTS = {**AREA, "module_cost": 2.0, "cost_factor": 2.0}
@@ -108,7 +108,7 @@ def test_pieces_cover_cells_and_have_heights() -> None:
 
 def test_actions_number_every_variant_on_every_cell() -> None:
     catalogue = yard().zone.catalogue
-    assert [(each.name, each.turned) for each in catalogue.variants] == [
+    assert [(variant.name, variant.turned) for variant in catalogue.variants] == [
         ("wall", False),
         ("wall", True),
         ("basket", False),
@@ -159,7 +159,7 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
             piece = catalogue.element(action)
             assert isinstance(piece, Piece)
             assert legal[action] == (placement.explain(piece) is None), (placement.layout, piece)
-        pieces = [each for each in placement.layout if isinstance(each, Piece)]
+        pieces = [element for element in placement.layout if isinstance(element, Piece)]
         for action in rng.integers(catalogue.finish, size=12).tolist():
             piece = catalogue.element(action)
             assert isinstance(piece, Piece)
@@ -307,7 +307,7 @@ def test_gas_goes_over_each_piece_at_its_own_height() -> None:
     assert set(of_structure["hut"]) == {""}
     unprotected = simulate(yard(), engine="gas").impulse("hut").pa_s
     low = yard(items=changed(0, height_m=0.5))
-    behind = [simulate(each, WALL[:2], engine="gas").impulse("hut").pa_s for each in (yard(), low)]
+    behind = [simulate(case, WALL[:2], engine="gas").impulse("hut").pa_s for case in (yard(), low)]
     assert behind[0] < 0.9 * unprotected
     assert behind[0] < 0.95 * behind[1]
 

@@ -20,7 +20,7 @@ from tests.site.documents import (
 HOUSE = ("structures", 0)
 BUNKER = ("structures", 1)
 AREAS = ("build_zone.keep_outs[0]", "build_zone.cost_areas[0]")
-AIR, EXPLOSIVE = (("simulation", "overrides", each) for each in ("air", "explosive"))
+AIR, EXPLOSIVE = (("simulation", "overrides", name) for name in ("air", "explosive"))
 KEEP_OUT = ("build_zone", "keep_outs", 0)
 PLACE = ("charge", 0, "position_m")
 

@@ -60,9 +60,9 @@ def others(document: Document) -> Iterator[tuple[KeyPath, Scenario]]:
             variants += [changed(document, path, value + step) for step in (1, -1, 0.125)]
         if isinstance(path[-1], str):
             variants.append(without(document, path))
-        for each in variants:
+        for variant in variants:
             with suppress(ScenarioError):
-                yield path, Scenario.from_document(each, "other")
+                yield path, Scenario.from_document(variant, "other")
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)

@@ -55,13 +55,13 @@ def test_bundled_scenario_lies_on_the_module_grid(name: str) -> None:
     rectangles.append(scenario.site.rectangle_m)
     if scenario.build_zone is not None:
         rectangles.append(scenario.build_zone.rectangle_m)
-        rectangles += [each.rectangle_m for each in scenario.build_zone.keep_outs]
+        rectangles += [keep_out.rectangle_m for keep_out in scenario.build_zone.keep_outs]
     assert all((2.0 * side).is_integer() for rectangle in rectangles for side in rectangle)
 
 
 def texts(least: int, most: int) -> st.SearchStrategy[str]:
     text = st.text(min_size=least, max_size=most)
-    return text.filter(lambda each: STEERING.search(each) is None)
+    return text.filter(lambda case: STEERING.search(case) is None)
 
 
 @given(
@@ -108,7 +108,7 @@ def test_order_of_keys_does_not_change_the_hash() -> None:
     for document in all_documents():
         backwards = reversed_keys(document)
         assert isinstance(backwards, dict)
-        texts = [tomli_w.dumps(each) for each in (document, backwards)]
+        texts = [tomli_w.dumps(case) for case in (document, backwards)]
         assert texts[0] != texts[1]
         first, second = (parse_scenario(text, "f.toml") for text in texts)
         assert scenario_hash(first) == scenario_hash(second)

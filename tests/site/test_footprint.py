@@ -51,7 +51,7 @@ def test_modules_have_that_area_on_average() -> None:
     """No side of a wall is favoured."""
     rng = np.random.default_rng(1)
     sizes = rng.uniform((0.0, 4.0, 4.0), (360.0, 20.0, 20.0), (200, 3))
-    areas = [cell_area_m2(footprint_of(block(*each))) for each in sizes.tolist()]
+    areas = [cell_area_m2(footprint_of(block(*siz))) for siz in sizes.tolist()]
     ratio = np.array(areas) / (sizes[:, 1] * sizes[:, 2])
     assert ratio.mean() == pytest.approx(1.0, abs=0.01)
     assert ratio.std() < 0.05
@@ -78,14 +78,14 @@ def test_boxes_are_the_modules() -> None:
 def test_walls_have_their_true_lengths_and_normals(angle: float, reverse: bool) -> None:
     ring = block(angle)
     walls = footprint_of(tuple(reversed(ring)) if reverse else ring).walls
-    assert sorted(each.length_m for each in walls) == pytest.approx([6.0, 6.0, 12.0, 12.0])
+    assert sorted(wall.length_m for wall in walls) == pytest.approx([6.0, 6.0, 12.0, 12.0])
     turn = radians(angle)
-    across = [each.normal for each in walls if each.length_m > 9.0]
+    across = [wall.normal for wall in walls if wall.length_m > 9.0]
     wanted = {(round(s * sin(turn), 6), round(-s * cos(turn), 6)) for s in (1.0, -1.0)}
     assert {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in across} == {
         (x + 0.0, y + 0.0) for x, y in wanted
     }
-    assert [each.is_oblique for each in walls] == [angle > 1.0] * 4  # 1 degree is half a step
+    assert [wall.is_oblique for wall in walls] == [angle > 1.0] * 4  # 1 degree is half a step
 
 
 def test_normals_of_courtyards_point_into_them() -> None:
@@ -130,8 +130,8 @@ def test_each_face_is_of_a_wall_and_each_wall_has_its_area(ring: Ring) -> None:
     centres, outwards = faces_of(footprint)
     wall, share = footprint.walls_of(centres, outwards)
     length_m = MODULE_SIDE_M * np.bincount(wall, weights=share, minlength=len(footprint.walls))
-    for each, own_m in zip(footprint.walls, length_m.tolist(), strict=True):
-        assert own_m == pytest.approx(each.length_m, abs=0.75)
+    for line, own_m in zip(footprint.walls, length_m.tolist(), strict=True):
+        assert own_m == pytest.approx(line.length_m, abs=0.75)
     assert length_m.sum() == pytest.approx(footprint.polygon.length, rel=0.04)
     away = [footprint.walls[n].distances_m(centres[i : i + 1])[0] for i, n in enumerate(wall)]
     assert max(away) < MODULE_SIDE_M

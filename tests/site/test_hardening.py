@@ -40,7 +40,7 @@ def glazed_yard(*hardening: dict[str, Any], **objective: Any) -> Scenario:
 
 def test_a_measure_covers_no_cell_and_can_be_taken_once() -> None:
     placement = LayoutState.empty(glazed_yard())
-    numbers = [each.is_measure for each in placement.catalogue.variants]
+    numbers = [variant.is_measure for variant in placement.catalogue.variants]
     legal = placement.legal[np.array(numbers)]
     assert legal.shape[0] == 2
     assert legal.sum() == 2
@@ -77,7 +77,7 @@ def test_measures_take_from_the_budget() -> None:
 def test_bays_get_what_measures_put_there() -> None:
     scenario = glazed_yard()
     unprotected, glazed = scenario.bays, scenario.bays_with([TAKEN, *WALL[:1]])
-    assert [each.bay for each in unprotected] == [each.bay for each in glazed]
+    assert [bay.bay for bay in unprotected] == [bay.bay for bay in glazed]
     for before, after in zip(unprotected, glazed, strict=True):
         assert before.glazing is not None
         assert after.glazing is not None
@@ -85,7 +85,9 @@ def test_bays_get_what_measures_put_there() -> None:
         assert (after.glazing.width_m, after.glazing.sill_m) == (1.0, before.glazing.sill_m)
         assert after.wall == before.wall
     panels = scenario.bays_with([Measure.named("panels")])
-    changed = {each.bay.wall for each, old in zip(panels, unprotected, strict=True) if each != old}
+    changed = {
+        panel.bay.wall for panel, old in zip(panels, unprotected, strict=True) if panel != old
+    }
     assert changed == {"west", "east"}
 
 
@@ -101,7 +103,7 @@ def test_a_rule_takes_the_dearest_glass_and_then_what_cuts_lines_of_sight() -> N
     better = {"name": "better", "glazing": "window_laminated_12", "cost": 6.0}
     scenario = glazed_yard(GLASS, better, PANELS)
     alone, both = hardening_alone(scenario), hardening_and_sight_lines(scenario)
-    assert {each[2:3] for each in alone} == {("better",), ("panels",)}
+    assert {case[2:3] for case in alone} == {("better",), ("panels",)}
     assert both[: len(alone)] == alone
     assert len(both) > len(alone)
     assert LayoutState.of(scenario, both).cost <= scenario.zone.cost_limit

@@ -66,7 +66,7 @@ def test_document_of_a_scenario_makes_the_same_scenario(document: Document) -> N
 def test_georeference_out_of_bounds_is_named(georeference: object, lines: list[str]) -> None:
     found = lines_for(changed(tall_document(), ("georeference",), georeference))
     for line in lines:
-        assert any(each.startswith(f"f.toml: {line}") for each in found), (line, found)
+        assert any(text.startswith(f"f.toml: {line}") for text in found), (line, found)
 
 
 def test_every_wall_without_a_height_is_as_high_as_the_air() -> None:
@@ -253,7 +253,7 @@ def test_charge_inside_a_building_is_refused(height_m: float) -> None:
 def test_engines_without_heights_can_say_what_they_leave_aside() -> None:
     assert scenario_from(full_document()).height_notes == ()
     bundled = [load_scenario(name) for name in bundled_scenarios()]
-    without_heights = {each.name for each in bundled if not each.height_notes}
+    without_heights = {name.name for name in bundled if not name.height_notes}
     assert without_heights == {"courtyard", "free_field", "perimeter_gate", "street_junction"}
     notes = scenario_from(tall_document()).height_notes
     words = ("endlessly high", "on the ground", "all walls", "gauges record nothing")

@@ -173,7 +173,7 @@ def test_a_copy_has_a_hash_of_its_own() -> None:
     """The hash is computed once for each scenario, and copies take over what a scenario holds."""
     scenario = load_scenario("courtyard")
     before = scenario.content_hash
-    lighter = tuple(each.model_copy(update={"tnt_kg": 50.0}) for each in scenario.charge)
+    lighter = tuple(source.model_copy(update={"tnt_kg": 50.0}) for source in scenario.charge)
     copied = scenario.model_copy(update={"charge": lighter})
     assert copied.content_hash != before
     assert copied.model_copy(update={"charge": scenario.charge}).content_hash == before

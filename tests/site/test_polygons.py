@@ -70,9 +70,9 @@ CORNERS = "structures[0].outline_m"
 def test_errors_name_value_bound_and_place(changes: dict[str, Any], key: str, words: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         museum(**changes)
-    found = [each for each in caught.value.problems if each.key == key]
+    found = [problem for problem in caught.value.problems if problem.key == key]
     assert found, caught.value
-    assert any(words in each.message for each in found), caught.value
+    assert any(words in problem.message for problem in found), caught.value
 
 
 def test_overlaps_are_of_modules_not_of_rectangles_around() -> None:
@@ -155,18 +155,20 @@ def test_the_surrogate_knows_its_walls() -> None:
 def test_pictures_and_drawings_show_the_outline(tmp_path: Path) -> None:
     scenario = museum(courtyards_m=[COURT], facade={"wall": "brick_215", "bay_m": 1.0})
     (feature,) = (
-        each for each in site_features(scenario) if each.kind is Kinds.PROTECTED_STRUCTURE
+        site_feature
+        for site_feature in site_features(scenario)
+        if site_feature.kind is Kinds.PROTECTED_STRUCTURE
     )
     assert set(feature.places_m) == set(OUTLINE)
     assert {place for hole in feature.holes_m for place in hole} == set(COURT)
     layout: Layout = ((0, 0),)
     site_picture(scenario, layout)
     assert "P" in placing_text(LayoutState.of(scenario, layout), scenario.charge)
-    assert len([each for each in boxes(scenario, layout) if each.name == "museum"]) > 1
+    assert len([box for box in boxes(scenario, layout) if box.name == "museum"]) > 1
     path = tmp_path / "museum.dxf"
     export_layout(LayoutPlan(scenario, layout), path)
     lines = readfile(path).modelspace().query("LWPOLYLINE[layer=='PROTECTED_STRUCTURE']")
-    assert sorted(len(list(each.vertices())) for each in lines if isinstance(each, LWPolyline)) == [
+    assert sorted(len(list(line.vertices())) for line in lines if isinstance(line, LWPolyline)) == [
         4,
         6,
     ]
@@ -186,9 +188,9 @@ def test_drawings_have_the_clearance_around_its_modules_and_in_courtyards() -> N
 
 def test_a_facade_is_set_once_for_all_walls() -> None:
     scenario = museum(facade={"wall": "brick_215", "bay_m": 1.0})
-    names = [each.bay.name for each in scenario.bays]
+    names = [bay.bay.name for bay in scenario.bays]
     assert len(names) == len(set(names))
-    assert {each.bay.wall for each in scenario.bays} == {"west", "east", "south", "north"}
+    assert {bay.bay.wall for bay in scenario.bays} == {"west", "east", "south", "north"}
     result = GasBlast(scenario, engine=GasEngine(border_m=0.0, until=0.02)).run()
     assert not result.unjudged
     assert len(result.bays)
@@ -197,7 +199,7 @@ def test_a_facade_is_set_once_for_all_walls() -> None:
 def test_the_page_edits_what_a_polygon_has() -> None:
     scenario, thing = museum(), SiteThing(ThingKind.STRUCTURE, 0)
     section = section_of(scenario, thing)
-    values = {each.label: value_of(section, each) for each in fields_of(scenario, thing)}
+    values = {field.label: value_of(section, field) for field in fields_of(scenario, thing)}
     assert values["height (m)"] == 2.0
     assert "left (m)" not in values
     assert resized(scenario, thing, (9.0, 7.0)) == scenario

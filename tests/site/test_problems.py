@@ -41,8 +41,8 @@ LEAST = "Input should be greater than or equal to"
 )
 def test_bad_value_is_named_with_its_bound(path: KeyPath, value: object, line: str) -> None:
     lines = lines_for(changed(full_document(), path, value))
-    assert any(line in each for each in lines), lines
-    assert all(each.startswith("f.toml: ") for each in lines)
+    assert any(line in case for case in lines), lines
+    assert all(line.startswith("f.toml: ") for line in lines)
 
 
 def test_misspelt_key_of_the_kind_gives_both_lines() -> None:

@@ -54,7 +54,7 @@ def test_a_blast_is_that_of_the_site_without_it() -> None:
     )
     assert away.digest == unprotected.digest
     assert there.impulse("hut").pa_s < away.impulse("hut").pa_s
-    names = [each.name for each in build_site(scenario, (AWAY,)).structures]
+    names = [structure.name for structure in build_site(scenario, (AWAY,)).structures]
     assert names == ["hut"]
 
 
@@ -84,7 +84,9 @@ def test_it_is_a_part_of_layouts_that_blasts_meet_and_that_covers_no_cell(tmp_pa
 def test_pictures_show_what_is_taken_away_apart() -> None:
     scenario = fenced()
     kinds = {
-        bool(layout): {each.name: each.kind for each in site_features(scenario, layout)}
+        bool(layout): {
+            site_feature.name: site_feature.kind for site_feature in site_features(scenario, layout)
+        }
         for layout in ((), (AWAY,))
     }
     assert kinds[False]["fence"] is Kinds.STRUCTURE

@@ -79,7 +79,7 @@ def zone_documents(draw: st.DrawFn) -> Document:
         module_cost=draw(costs),
         clearance_m=draw(st.sampled_from([0.0, 0.0, 0.25, 0.5, 1.0])),
         keep_outs=draw(st.lists(areas, max_size=2)),
-        cost_areas=[{**each, "module_cost": draw(costs)} for each in draw(st.lists(areas))],
+        cost_areas=[{**case, "module_cost": draw(costs)} for case in draw(st.lists(areas))],
     )
     zone = document["build_zone"]
     if draw(st.booleans()):
@@ -118,17 +118,19 @@ def modules_may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
     """Whether the site leaves room for modules on all these cells, whatever they cost."""
     zone = scenario.zone
     squares = [zone.cell_rectangle_m(cell) for cell in cells]
-    if any(square.overlaps(each.rectangle_m) for square in squares for each in zone.keep_outs):
+    if any(
+        square.overlaps(keep_out.rectangle_m) for square in squares for keep_out in zone.keep_outs
+    ):
         return False
-    solids = [each.rectangle_m for each in scenario.structures]
+    solids = [structure.rectangle_m for structure in scenario.structures]
     for square in squares:
         grounds = _grounds_m(scenario, square)
         if len(grounds) > 1:
             return False
         beside = [
-            each.rectangle_m
-            for each in scenario.structures
-            if not each.carries or (each.height_m or 0.0) > min(grounds)
+            structure.rectangle_m
+            for structure in scenario.structures
+            if not structure.carries or (structure.height_m or 0.0) > min(grounds)
         ]
         if any(square.overlaps(solid) for solid in beside):
             return False
@@ -153,8 +155,12 @@ def _grounds_m(scenario: Scenario, square: Rectangle) -> set[float]:
     heights_m = set()
     for x_m, y_m in product((left + 0.125, left + 0.375), (bottom + 0.125, bottom + 0.375)):
         quarter = Rectangle(x_m, y_m, x_m, y_m)
-        carrying = [each for each in scenario.structures if each.carries]
-        own = [each.height_m or 0.0 for each in carrying if each.rectangle_m.contains(quarter)]
+        carrying = [structure for structure in scenario.structures if structure.carries]
+        own = [
+            structure.height_m or 0.0
+            for structure in carrying
+            if structure.rectangle_m.contains(quarter)
+        ]
         heights_m.add(max(own, default=0.0))
     return heights_m
 
@@ -180,8 +186,8 @@ def can_cross(passable: np.ndarray, width: int) -> bool:
 
 
 def _cost(zone: BuildZone, square: Rectangle) -> float:
-    areas = [each for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
-    return max((each.module_cost or 0.0 for each in areas), default=zone.module_cost)
+    areas = [cost_area for cost_area in zone.cost_areas if square.overlaps(cost_area.rectangle_m)]
+    return max((area.module_cost or 0.0 for area in areas), default=zone.module_cost)
 
 
 def _distance_m(one: Rectangle, other: Rectangle) -> float:
@@ -203,7 +209,8 @@ def catalogue_documents(draw: st.DrawFn) -> Document:
     zone = document["build_zone"]
     del zone["module_cost"]
     zone["cost_areas"] = [
-        {"cost_factor": each.pop("module_cost"), **each} for each in zone["cost_areas"]
+        {"cost_factor": cost_area.pop("module_cost"), **cost_area}
+        for cost_area in zone["cost_areas"]
     ]
     lengths, costs = st.integers(1, 4), st.sampled_from([0.5, 1.0, 2.5])
     zone["items"] = [
@@ -260,5 +267,5 @@ def pieces_may_stand(scenario: Scenario, layout: Collection[Piece]) -> bool:
 
 
 def _factor(zone: BuildZone, square: Rectangle) -> float:
-    areas = [each for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
-    return max((each.cost_factor or 0.0 for each in areas), default=1.0)
+    areas = [cost_area for cost_area in zone.cost_areas if square.overlaps(cost_area.rectangle_m)]
+    return max((area.cost_factor or 0.0 for area in areas), default=1.0)

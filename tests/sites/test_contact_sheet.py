@@ -21,7 +21,7 @@ def test_everything_on_a_site_is_drawn_where_it_is(sites: tuple[Scenario, ...]) 
         for area in areas:
             left, bottom, right, top = area.rectangle_m
             assert {(left, bottom), (right, bottom), (right, top), (left, top)} in drawn
-        wide = [each for each in site.charge if isinstance(each, RectangleSource)]
+        wide = [source for source in site.charge if isinstance(source, RectangleSource)]
         assert len(drawn) == len(areas) + len(wide) + 1  # the ground
         ways = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
         assert len(ways) == (zone.access_way is not None)

@@ -55,7 +55,9 @@ def test_everything_is_drawn(item_sites: tuple[Scenario, ...]) -> None:
         return len(set(values)) > 1
 
     assert differ([bool(site.vehicles) for site in item_sites])
-    assert differ([sum(each.protected for each in site.structures) for site in item_sites])
+    assert differ(
+        [sum(structure.protected for structure in site.structures) for site in item_sites]
+    )
     assert differ([site.structures[0].height_m for site in item_sites])
     assert differ([site.zone.access_way is None for site in item_sites])
     assert differ([len(site.zone.keep_outs) for site in item_sites])
@@ -72,7 +74,7 @@ def test_all_share_the_spaces(item_sites: tuple[Scenario, ...]) -> None:
     assert source.representative.vehicles
     for site in item_sites:
         check_size(site, source.representative)
-        assert [each.name for each in site.zone.items] == [kind.name for kind in ITEM_KINDS]
+        assert [item.name for item in site.zone.items] == [kind.name for kind in ITEM_KINDS]
         assert site.zone.shape == (RANGES.zone_cells, RANGES.zone_cells)
 
 
@@ -160,10 +162,12 @@ def test_threats_are_closer_on_close_sites(side_m: float) -> None:
         assert ItemSiteRanges.criterion.objection(site) is None
         assert generate_site(seed, close_ranges(side_m)) == site
         stand_offs_m = [
-            Rectangle(*each.rectangle_m).distance_to(threat.charge_against(site, ()).position_m)
+            Rectangle(*structure.rectangle_m).distance_to(
+                threat.charge_against(site, ()).position_m
+            )
             for threat in draw_threats(site, range(3))
-            for each in site.structures
-            if each.protected
+            for structure in site.structures
+            if structure.protected
         ]
         assert min(stand_offs_m) <= 0.55 * side_m < RANGES.stand_off_m[1]
 

@@ -83,7 +83,7 @@ def test_dear_cells_are_used_last() -> None:
     dear = {"corner_m": (9.0, 8.0), "size_m": (3.0, 2.0), "reason": "duct", "module_cost": 9.0}
     scenario = yard(stock=2, cost_areas=[dear], budget=100.0)
     layout = visibility_layout(scenario, Visibility.of(scenario))
-    assert all(each[0] >= 4 for each in layout)
+    assert all(element[0] >= 4 for element in layout)
 
 
 def test_where_nothing_is_seen_the_rule_of_sight_lines_builds_nothing() -> None:

@@ -91,7 +91,7 @@ def test_more_modules_never_cut_less_nor_more_than_they_do_apart(
     some: list[tuple[int, int]], others: list[tuple[int, int]]
 ) -> None:
     both = YARD_LINES.cut_share([*some, *others])
-    apart = [YARD_LINES.cut_share(each) for each in (some, others)]
+    apart = [YARD_LINES.cut_share(case) for case in (some, others)]
     assert max(apart) - 1e-12 <= both <= sum(apart) + 1e-12
 
 

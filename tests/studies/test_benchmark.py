@@ -77,5 +77,5 @@ def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.Mo
     problem = make("control_room-known-v2", 3, engine=RowEngine())
     (run,) = play(methods.imitation, [(lambda _: problem, 3, 0)])
     assert 1 <= run.blasts <= 3
-    assert run.layout == min(problem.history, key=lambda each: each.share).layout
-    assert all(each.layout for each in problem.history)
+    assert run.layout == min(problem.history, key=lambda step: step.share).layout
+    assert all(step.layout for step in problem.history)

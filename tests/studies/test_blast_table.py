@@ -33,14 +33,14 @@ def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
     scenario, out = COURTYARD, tmp_path / "blasts.parquet"
     evaluator = BlastEvaluator(scenario, "event", cache=tmp_path / "blasts")
     threats = draw_threats(scenario, range(2))
-    found = [evaluator.loads((), each) for each in threats]
+    found = [evaluator.loads((), threat) for threat in threats]
     code, words = run(tmp_path / "blasts", tmp_path / "blasts", "--out", out)
     assert (code, words.split(";")[0]) == (0, "2 blasts")
     table = pd.read_parquet(out).sort_values("seed")
-    assert table["impulse_pa_s"].tolist() == [each.structures[0].impulse_pa_s for each in found]
+    assert table["impulse_pa_s"].tolist() == [case.structures[0].impulse_pa_s for case in found]
     assert set(table["scenario_hash"]) == {scenario.content_hash}
-    assert table["seed"].tolist() == [each.seed for each in threats]
-    assert [json.loads(each) for each in table["layout"]] == [[], []]
+    assert table["seed"].tolist() == [threat.seed for threat in threats]
+    assert [json.loads(case) for case in table["layout"]] == [[], []]
 
 
 def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def old_rows(layouts: list[str]) -> pd.DataFrame:
         "impulse_pa_s": 1.0,
         "peak_pa": 1.0,
     }
-    return pd.DataFrame([values | {"layout": each} for each in layouts * 2])[NAMES]
+    return pd.DataFrame([values | {"layout": layout} for layout in layouts * 2])[NAMES]
 
 
 def test_each_blast_is_asked_for_once_the_empty_site_first() -> None:
@@ -124,7 +124,7 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
     found = read_frame(tmp_path / "again" / table.name, COLUMNS)
     engine = GasEngine(cells="coarse")
     blast = GasBlast(load_scenario(SITE), engine=engine, charge=Charge((10.0, 3.0), 20.0))
-    loads = {each.name: each.impulse_pa_s for each in blast.run().loads().structures}
+    loads = {structure.name: structure.impulse_pa_s for structure in blast.run().loads().structures}
     assert dict(zip(found["structure"], found["impulse_pa_s"], strict=True)) == loads
     assert set(found["scenario"]) == {SITE}
     monkeypatch.setattr(GasBlast, "run", None)

@@ -77,10 +77,10 @@ FACADE = (
 
 
 def test_the_engines_agree_where_balls_only_meet_a_facade() -> None:
-    for each in agreements({"facade": FACADE}, 10, 1, (0.5, 0.25)):
-        assert each.is_close
-        assert abs(each.transferred.value) < 0.01
-        assert len(each.cells()) == len(HEADERS)
+    for agreement in agreements({"facade": FACADE}, 10, 1, (0.5, 0.25)):
+        assert agreement.is_close
+        assert abs(agreement.transferred.value) < 0.01
+        assert len(agreement.cells()) == len(HEADERS)
 
 
 def test_a_difference_by_hand() -> None:

@@ -28,14 +28,18 @@ def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str
     budget = scenario.zone.budget
     assert budget is not None
     assert 0.0 < LayoutState.of(scenario, found).cost <= budget
-    assert all(each.facade is not None for each in scenario.structures if each.protected)
+    assert all(
+        structure.facade is not None for structure in scenario.structures if structure.protected
+    )
 
 
 def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
     scenario = load_scenario("guard_post")
     evaluator = BlastEvaluator(scenario, find_engine("gas", 0.5))
     found, target = load_layout(FOUND / "guard_post.json", scenario), scenario.objective.level
-    charges = [each.charge for each in one_of_each_charge(draw_threats(scenario, range(16)))]
+    charges = [
+        load_case.charge for load_case in one_of_each_charge(draw_threats(scenario, range(16)))
+    ]
     assert len(charges) == 2
     assert target is not None
     assert not consequences(evaluator, (), charges).passes(target)

@@ -151,7 +151,7 @@ def between(start_m: np.ndarray, end_m: np.ndarray) -> np.ndarray:
 
 def is_inside(points_m: np.ndarray, solids: np.ndarray) -> bool:
     """Whether any of the points is inside any of the solids."""
-    x, y, z = (each[:, np.newaxis] for each in points_m.T)
+    x, y, z = (point_m[:, np.newaxis] for point_m in points_m.T)
     inside = (solids[:, 0] < x) & (x < solids[:, 2]) & (solids[:, 1] < y)
     return bool((inside & (y < solids[:, 3]) & (z < solids[:, 4])).any())
 
@@ -249,7 +249,7 @@ def test_far_outside_its_fit_no_guess_is_without_bounds() -> None:
         site, rng = site_of(scenario), np.random.default_rng(0)
         layouts = [(), *(random_layout(scenario, rng) for _ in range(3))]
         (threat,) = draw_threats(scenario, range(1))
-        charges = [threat.charge_against(scenario, each) for each in layouts]
+        charges = [threat.charge_against(scenario, layout) for layout in layouts]
         guess = surrogate.guess(site, layouts, charges)
         assert guess.peak_pa is not None
         for row, charge in enumerate(charges):
@@ -269,7 +269,7 @@ def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     assert again.fit == ABOUT
     charge = Charge((1.5, 4.0), 5.0)
     for site in (site_of(YARD), site_of(PEAKS)):
-        kept, read = (each.guess(site, [()], [charge]).loads(site) for each in (surrogate, again))
+        kept, read = (case.guess(site, [()], [charge]).loads(site) for case in (surrogate, again))
         assert kept == pytest.approx(read, rel=1e-4)
 
 
@@ -301,7 +301,7 @@ def test_peaks_are_guessed_where_they_count() -> None:
     surrogate, charge = by_hand(), Charge((1.5, 4.0), 5.0)
     layouts = [(), random_layout(YARD, np.random.default_rng(0))]
     impulses, peaks = (
-        surrogate.guess(site_of(each), layouts, 2 * [charge]) for each in (YARD, PEAKS)
+        surrogate.guess(site_of(case), layouts, 2 * [charge]) for case in (YARD, PEAKS)
     )
     assert impulses.peak_pa is None
     assert peaks.peak_pa is not None
@@ -346,14 +346,14 @@ def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
     evaluator = BlastEvaluator(YARD, SurrogateEngine(surrogate))
     layout = random_layout(YARD, np.random.default_rng(0))
     first, second = draw_threats(YARD, range(2))
-    loads = [evaluator.loads(layout, each) for each in (first, replace(first, seed=9), second)]
-    charges = [each.charge_against(YARD, layout) for each in (first, second)]
+    loads = [evaluator.loads(layout, case) for case in (first, replace(first, seed=9), second)]
+    charges = [case.charge_against(YARD, layout) for case in (first, second)]
     site = site_of(YARD)
     said = surrogate.guess(site, [layout, layout], charges).impulse_pa_s
-    protected = [[each.impulse_pa_s for each in of_blast.protected] for of_blast in loads]
+    protected = [[structure.impulse_pa_s for structure in of_blast.protected] for of_blast in loads]
     assert protected == [pytest.approx(said[0]), protected[0], pytest.approx(said[1])]
-    others = [each for each in loads[0].structures if not each.protected]
-    assert all(each.impulse_pa_s == 0.0 for each in others)
+    others = [structure for structure in loads[0].structures if not structure.protected]
+    assert all(other.impulse_pa_s == 0.0 for other in others)
     assert loads[0].are_for(YARD)
     assert evaluator.counts.blasts == 2  # a seed changes nothing
     assert evaluator.calibration_name == "none"
@@ -370,18 +370,20 @@ def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
     assert guess.peak_spread is not None
     (plain, safe), (unprotected, safe_unprotected) = (
         [
-            BlastEvaluator(PEAKS, SurrogateEngine(surrogate, safe=flag)).loads(each, threat)
+            BlastEvaluator(PEAKS, SurrogateEngine(surrogate, safe=flag)).loads(layout_tried, threat)
             for flag in (False, True)
         ]
-        for each in (layout, ())
+        for layout_tried in (layout, ())
     )
     for before, after, widths in (
         ("impulse_pa_s", guess.impulse_pa_s, CHECK.spreads * guess.spread),
         ("peak_pa", guess.peak_pa, 4.0 * guess.peak_spread),
     ):
-        assert [getattr(each, before) for each in plain.protected] == pytest.approx(after[0])
+        assert [getattr(structure, before) for structure in plain.protected] == pytest.approx(
+            after[0]
+        )
         upper = after[0] * np.exp(widths[0])
-        assert [getattr(each, before) for each in safe.protected] == pytest.approx(upper)
+        assert [getattr(structure, before) for structure in safe.protected] == pytest.approx(upper)
         assert (upper > after[0]).all()
     assert safe_unprotected.structures == unprotected.structures
     with pytest.raises(BlastEnvError, match=r"has no intervals: .*calibrate"):
@@ -436,7 +438,7 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
         Samples.of(table, {})
     samples = Samples.of(table, {YARD.content_hash: YARD})
     held = folds(samples.case, 4, 0)
-    assert sum(each.sum() for each in held) == len(samples)
+    assert sum(fold.sum() for fold in held) == len(samples)
     learnt = fit(samples, ~held[0], 20, 0, ABOUT, 2)
     off = errors(learnt, samples, held[0])
     for found, loads in ((off.impulse, samples.impulse), (off.peak, samples.peak)):
@@ -485,7 +487,7 @@ def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
     ranked = improved(guesses, begin, 20, np.random.default_rng(0))
     loads = guesses.loads(ranked)
     assert (np.diff(loads) >= 0.0).all()
-    assert loads[0] <= guesses.loads([tuple(sorted(each)) for each in begin]).min()
+    assert loads[0] <= guesses.loads([tuple(sorted(layout)) for layout in begin]).min()
     assert len(ranked) > len(begin)
     for layout in ranked:
         assert LayoutState.of(YARD, layout).layout == layout
@@ -518,7 +520,7 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
 ) -> None:
     surrogate, drawing = by_hand(), Drawing()
     proposed = LearntSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
-    drawn = [tuple(sorted(each)) for each in drawing.sample(YARD, charge, 3)]
+    drawn = [tuple(sorted(layout)) for layout in drawing.sample(YARD, charge, 3)]
     met = case() if charge is None else LoadCaseSet(YARD, (LoadCase(charge, 0),))
     likes = Guesses.of(surrogate, met).loads([(), *drawn])
     if charge is not None:
@@ -530,7 +532,9 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     """With blasts for all rules it is at least as good as the best of them."""
     problem = DesignProblem(BlastEvaluator(YARD, FAST), case())
-    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.known_charge).values()}
+    ruled = {
+        tuple(sorted(layout)) for layout in layouts_by_rule(YARD, problem.known_charge).values()
+    }
     budget = len(ruled) + 2
     method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
     result = method.propose(problem, budget, 0)
@@ -578,7 +582,7 @@ def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -
 
 def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     (threat,) = case().threats
-    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD).values()}
+    ruled = {tuple(sorted(layout)) for layout in layouts_by_rule(YARD).values()}
     layouts = Recipe(8).of(YARD, threat, 1)
     assert layouts[0] == ()
     assert len(set(layouts)) == len(layouts) > 8
@@ -602,15 +606,15 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     options = ["check", str(tmp_path / "few.parquet"), "--surrogate", str(surrogate)]
     done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
     rows_of = [line.split("|")[1:-1] for line in done.output.splitlines()[2:4]]
-    assert [each[0].strip() for each in rows_of] == [
+    assert [row[0].strip() for row in rows_of] == [
         f"{load} on 2 sites of few" for load in ("impulse", "peak")
     ]
-    for each in rows_of:
-        assert 0.0 < float(each[2]) < 0.2  # near what it was fitted to, and never quite right
-        assert float(each[4]) > 0.5
+    for row in rows_of:
+        assert 0.0 < float(row[2]) < 0.2  # near what it was fitted to, and never quite right
+        assert float(row[4]) > 0.5
     coverage = [line.split("|")[1:-1] for line in done.output.splitlines()[-2:]]
-    assert {each[0].strip() for each in coverage} == set(names.to_pylist())
-    assert all(float(each[3].strip(" %")) > 80.0 for each in coverage)
+    assert {line[0].strip() for line in coverage} == set(names.to_pylist())
+    assert all(float(line[3].strip(" %")) > 80.0 for line in coverage)
 
 
 def test_held_out_predictions_set_the_intervals() -> None:
@@ -621,7 +625,7 @@ def test_held_out_predictions_set_the_intervals() -> None:
     spread = np.full(len(samples), 0.1)
     off = np.where(samples.site % 40 == 0, 0.3, 0.1)
     logs = samples.impulse.target + off
-    found = [Predictions(logs[each], spread[each]) for each in held_out]
+    found = [Predictions(logs[fold], spread[fold]) for fold in held_out]
     joined = HeldOut.of(samples, samples.impulse, held_out, found)
     assert joined.check.spreads == pytest.approx(1.0)
     assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))

@@ -126,7 +126,7 @@ def test_no_simulated_drive_is_faster_than_the_bound(
     yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
     stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
     places_km_h = speeds_of(yard, Obstacles(stops)).places_km_h
-    grown = np.array([each.grown(1.0 - 1e-9) for each in stops]).reshape(-1, 4)
+    grown = np.array([stop.grown(1.0 - 1e-9) for stop in stops]).reshape(-1, 4)
     rng = np.random.default_rng(seed)
     drives, step_m, most = 600, 0.2, 0.7 * 9.81
     x, y = np.full(drives, 1.0), rng.uniform(11.0, 19.0, drives)
@@ -188,25 +188,27 @@ def test_what_gives_way_is_what_a_full_search_of_every_round_says(
     rectangles = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
     every = speeds_of(yard, Obstacles(rectangles))
     held = tuple(
-        RatedPiece(each, CrashRating(mass_kg=7200.0, speed_km_h=km_h + over), f"piece {number}")
-        for number, (each, over) in enumerate(zip(rectangles, over_km_h, strict=False))
-        if (km_h := every.impact_km_h(each)) is not None
+        RatedPiece(
+            rectangle, CrashRating(mass_kg=7200.0, speed_km_h=km_h + over), f"piece {number}"
+        )
+        for number, (rectangle, over) in enumerate(zip(rectangles, over_km_h, strict=False))
+        if (km_h := every.impact_km_h(rectangle)) is not None
     )
     drive = yard.drive(Obstacles(rated=held))
     broken: tuple[RatedPiece, ...] = ()
     while True:
-        stops, solid = (tuple(each.rectangle for each in some) for some in (held, broken))
+        stops, solid = (tuple(case.rectangle for case in some) for some in (held, broken))
         speeds = speeds_of(yard, Obstacles(stops, solid))
-        hits_km_h = [speeds.impact_km_h(each.rectangle) or 0.0 for each in held]
+        hits_km_h = [speeds.impact_km_h(ratedpiece.rectangle) or 0.0 for ratedpiece in held]
         weak = [
-            each
-            for each, km_h in zip(held, hits_km_h, strict=True)
-            if km_h > each.rating.speed_km_h
+            ratedpiece
+            for ratedpiece, km_h in zip(held, hits_km_h, strict=True)
+            if km_h > ratedpiece.rating.speed_km_h
         ]
         if not weak:
             break
         broken = (*broken, *weak)
-        held = tuple(each for each in held if each not in weak)
+        held = tuple(ratedpiece for ratedpiece in held if ratedpiece not in weak)
     assert (drive.held, drive.broken) == (held, broken)
 
 
@@ -262,8 +264,8 @@ def test_what_gives_way_opens_the_run_up_to_the_next() -> None:
     )
     obstacles = Obstacles(rated=pieces)
     drive = road.drive(obstacles)
-    assert [each.name for each in drive.broken] == ["first", "second"]
-    assert [each.name for each in drive.held] == ["third"]
+    assert [rated_piece.name for rated_piece in drive.broken] == ["first", "second"]
+    assert [entry.name for entry in drive.held] == ["third"]
 
 
 def rated_site(rating: Any, vehicle: dict[str, Any] | None = None, **motion: Any) -> Scenario:
@@ -423,7 +425,7 @@ def test_the_rule_of_posts_takes_those_that_hold() -> None:
         motion = LORRY | {"max_speed_km_h": 60.0, "entry_speed_km_h": 50.0}
         site = gate_site(vehicle_document(motion=motion), build_zone=zone | {"items": items})
         posts = line_of_posts(site)
-        taken.append({each.item for each in posts if isinstance(each, Piece)})
+        taken.append({post.item for post in posts if isinstance(post, Piece)})
     assert taken == [{"heavy"}, {"light"}]
 
 
@@ -439,6 +441,6 @@ def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
         for x, n in ((15.0, "first"), (30.0, "second"), (45.0, "third"))
     )
     way, through = site.drive(Obstacles(rated=fences)).weakest_way
-    assert [each.piece.name for each in through] == ["first", "second", "third"]
+    assert [case.piece.name for case in through] == ["first", "second", "third"]
     assert "first" in site.explain("a lorry", Obstacles(rated=fences))
     assert way[-1].place_m[0] > 46.0

@@ -137,7 +137,7 @@ def test_ground_that_is_not_drivable_and_keep_outs_are_closed() -> None:
     free = gate_site()
     on_road = gate_site(vehicle_document(drivable=road))
     on_both = gate_site(vehicle_document(drivable=road, keep_outs=ditch))
-    reaches = [vehicle_reach(each, vehicle_of(each)) for each in (free, on_road, on_both)]
+    reaches = [vehicle_reach(case, vehicle_of(case)) for case in (free, on_road, on_both)]
     farthest_m = [reach.places_m.max(axis=0).tolist() for reach in reaches]
     assert farthest_m == [[13.0, 7.0], [7.0, 4.0], [5.0, 4.0]]
 

@@ -77,7 +77,7 @@ class BayLoads:
         """Return the loads of a run that has not begun, to be recorded by `GasRun.record`."""
         from blast_env.gas.probes import PatchHistories
 
-        patch = bay_patches(run.table, [each.name for each in run.site.structures], bays)
+        patch = bay_patches(run.table, [structure.name for structure in run.site.structures], bays)
         seen = np.unique(patch[patch >= 0])
         renumbered = np.full(len(bays) + 1, -1)  # the last is for no bay
         renumbered[seen] = np.arange(len(seen))
@@ -101,8 +101,8 @@ class BayLoads:
 
         The factor on peaks makes them as sharp as in the open.
         """
-        by_name = {each.name: each for each in alternatives}
-        own = [by_name[each.bay.name] for each in self.bays]
+        by_name = {alternative.name: alternative for alternative in alternatives}
+        own = [by_name[bay.bay.name] for bay in self.bays]
         return bay_damages(own, *self.histories, peak_factor) if own else ()
 
     @property
@@ -123,7 +123,7 @@ class BayLoads:
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
         import pandas as pd
 
-        names = [each.bay.name for each in self.bays]
+        names = [bay.bay.name for bay in self.bays]
         if name not in names:
             raise UnknownNameError("bay", name, names)
         history = self.history_pa[names.index(name)]
@@ -135,12 +135,12 @@ class BayLoads:
             return table_of([], LOADED_BAY_COLUMNS)
         known = self.known(run)
         cells = cbrt(run.site.charge.tnt_kg) / run.grid.cell_m
-        validations = bay_validations(run.site, [each.bay for each in self.bays], cells, known)
+        validations = bay_validations(run.site, [bay.bay for bay in self.bays], cells, known)
         return table_of(bay_rows(self.response, known, validations), LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
         """Return whether the load of each bay was known at the end of the run, by its name."""
-        names = [each.name for each in run.site.structures]
+        names = [structure.name for structure in run.site.structures]
         come = {name: run.has_come(index) for index, name in enumerate(names)}
         net = impulses(*self.histories)
         known = is_known(net.max(axis=1, initial=0.0), net[:, -1])
@@ -161,13 +161,13 @@ def unjudged_walls(
 
     `area_m2` is the area of each face along the normal of its wall (faces,).
     """
-    structures = [each.name for each in outlines]
+    structures = [outline.name for outline in outlines]
     left_out, counts = bay_patches(table, structures, bays) < 0, np.zeros(len(table.face), bool)
-    for index, each in enumerate(outlines):
-        walls = [FACE_NAMES.index(name) for name in each.faces]
+    for index, outline in enumerate(outlines):
+        walls = [FACE_NAMES.index(name) for name in outline.faces]
         counts |= (table.structure == index) & np.isin(table.face, walls)
     found = []
-    for building in dict.fromkeys(buildings[each.bay.structure] for each in bays):
+    for building in dict.fromkeys(buildings[bay.bay.structure] for bay in bays):
         parts = [i for i, name in enumerate(structures) if buildings.get(name) == building]
         own = counts & np.isin(table.structure, parts)
         without = own & left_out
@@ -240,8 +240,8 @@ def bay_patches(
     """Return the index of the bay of each cell face, -1 for none (faces,)."""
     patch = np.full(len(table.faces), -1)
     walls: dict[tuple[str, str], list[int]] = {}
-    for index, each in enumerate(bays):
-        walls.setdefault((each.bay.structure, each.bay.wall), []).append(index)
+    for index, item in enumerate(bays):
+        walls.setdefault((item.bay.structure, item.bay.wall), []).append(index)
     for (structure, wall), members in walls.items():
         own = np.flatnonzero(
             (table.structure == structures.index(structure))

@@ -144,7 +144,7 @@ class Engine(ABC):
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the loads of several blasts, by default one after the other."""
-        return [self.loads(*each) for each in blasts]
+        return [self.loads(*blast) for blast in blasts]
 
     def record(
         self,
@@ -296,7 +296,7 @@ def default_engine(use: str, *scenarios: Scenario) -> str:
         use: The id of an environment, or a command.
         scenarios: The sites.
     """
-    if any(each.height_notes for each in scenarios):
+    if any(scenario.height_notes for scenario in scenarios):
         return JUDGE
     return PAPER_ENGINES.get(use, JUDGE)
 

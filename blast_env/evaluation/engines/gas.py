@@ -108,8 +108,8 @@ def response_time_s(scenario: Scenario) -> float:
     """
     hardened = (
         bay
-        for each in scenario.alternatives
-        for bay in (*each.glazing.values(), *each.wall.values())
+        for alternative in scenario.alternatives
+        for bay in (*alternative.glazing.values(), *alternative.wall.values())
     )
     return slowest_period_s([*scenario.bays, *hardened])
 
@@ -166,8 +166,8 @@ class GasEngine(GasSettings, Engine):
 
     def final(self, scenarios: Sequence[Scenario]) -> "GasEngine":
         """Return the engine with cells of 0.25 m, which grow if a site is wider than 40 m."""
-        sides_m = [each.site.width_m for each in scenarios]
-        sides_m += [each.site.height_m for each in scenarios]
+        sides_m = [scenario.site.width_m for scenario in scenarios]
+        sides_m += [scenario.site.height_m for scenario in scenarios]
         if max(sides_m, default=0.0) > _WIDEST_UNIFORM_M:
             return replace(self, cells="fine")
         return replace(self, cell_m=_FINAL_CELL_M)
@@ -389,12 +389,12 @@ class GasResult:
         """Notes on gauges inside a solid, which record the nearest air, one sentence each."""
         notes = []
         centres_m = self.gauges[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
-        for each, centre_m in zip(self.run.site.gauges, centres_m, strict=True):
-            beyond_m = np.abs(centre_m - each.position_m) - 0.5 * self.run.grid.cell_m
+        for gauge, centre_m in zip(self.run.site.gauges, centres_m, strict=True):
+            beyond_m = np.abs(centre_m - gauge.position_m) - 0.5 * self.run.grid.cell_m
             if beyond_m.max() > _AT_SURFACE_M:
                 x_m, y_m, z_m = centre_m.tolist()
                 notes.append(
-                    f"gauge {each.name}: lies inside a solid; its load is that of the nearest air,"
+                    f"gauge {gauge.name}: lies inside a solid; its load is that of the nearest air,"
                     f" at ({x_m:g}, {y_m:g}, {z_m:g}) m"
                 )
         return tuple(notes)
@@ -403,7 +403,7 @@ class GasResult:
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`."""
         import pandas as pd  # it takes a third of a second
 
-        names = [each.name for each in self.run.site.gauges]
+        names = [gauge.name for gauge in self.run.site.gauges]
         if gauge not in names or self.run.gauges is None:
             raise UnknownNameError("gauge", gauge, names)
         pressure = np.asarray(self.run.gauges.history_pa)[:, names.index(gauge)]
@@ -452,7 +452,9 @@ class GasResult:
         Raises:
             UnknownNameError: If there is no structure of that name.
         """
-        names = [each.name for each in self.run.site.structures if not each.is_barrier]
+        names = [
+            structure.name for structure in self.run.site.structures if not structure.is_barrier
+        ]
         if structure not in names:
             raise UnknownNameError("structure", structure, names)
         return self._scaled(names.index(structure))
@@ -460,7 +462,7 @@ class GasResult:
     @property
     def structure_loads(self) -> tuple[StructureLoad, ...]:
         """The loads on all structures."""
-        named = {each.name: each for each in self.blast.scenario.structures}
+        named = {structure.name: structure for structure in self.blast.scenario.structures}
         return tuple(
             StructureLoad.on(
                 named[outline.name],
@@ -478,14 +480,20 @@ class GasResult:
 
     def validation(self, names: Collection[str]) -> Validation:
         """Return the validation status of the load on a structure, or on parts of a building."""
-        counted = counted_parts([each for each in self.run.site.structures if each.name in names])
-        return worst_validation(self._validations[each.name] for each in counted)
+        counted = counted_parts(
+            [structure for structure in self.run.site.structures if structure.name in names]
+        )
+        return worst_validation(self._validations[structure.name] for structure in counted)
 
     @cached_property
     def _validations(self) -> dict[str, Validation]:
         """The validation status of the load on the counted walls of each structure, by name."""
         structures = enumerate(self.run.site.structures)
-        return {each.name: self._validated(k) for k, each in structures if not each.is_barrier}
+        return {
+            structure.name: self._validated(k)
+            for k, structure in structures
+            if not structure.is_barrier
+        }
 
     def _validated(self, index: int) -> Validation:
         run, scenario = self.run, self.blast.scenario

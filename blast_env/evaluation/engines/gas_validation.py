@@ -71,7 +71,9 @@ class BayPlaces(NamedTuple):
 
 def bay_places(site: BlastSite, bays: Sequence[Bay]) -> BayPlaces:
     """Return the places of bays relative to the charge of a site."""
-    points, outward = bay_middles({each.name: each.rectangle_m for each in site.structures}, bays)
+    points, outward = bay_middles(
+        {structure.name: structure.rectangle_m for structure in site.structures}, bays
+    )
     charge_m = np.array([*site.charge.position_m, site.charge.height_m])
     distance_m = np.linalg.norm(points - charge_m, axis=1)
     return BayPlaces(distance_m, in_sight(site, points + MODULE_SIDE_M * outward, outward))
@@ -84,8 +86,8 @@ def bay_middles(
 
     `rectangles_m` has the rectangle around each structure, by name.
     """
-    points = np.array([_middle_m(rectangles_m[each.structure], each) for each in bays])
-    outward = np.array([(*_outward(each), 0.0) for each in bays])
+    points = np.array([_middle_m(rectangles_m[bay.structure], bay) for bay in bays])
+    outward = np.array([(*_outward(bay), 0.0) for bay in bays])
     return points.reshape(-1, 3), outward.reshape(-1, 3)
 
 
@@ -120,9 +122,9 @@ def bay_validations(
             float(distance_m) / scale,
             1.0 - float(seen),
             cells,
-            known.get(each.name, True),
-            each.line is not None and min(map(abs, each.line.normal)) > _OBLIQUE,
+            known.get(bay.name, True),
+            bay.line is not None and min(map(abs, bay.line.normal)) > _OBLIQUE,
             site.charge.is_raised,
         )
-        for each, distance_m, seen in zip(bays, *places, strict=True)
+        for bay, distance_m, seen in zip(bays, *places, strict=True)
     )

@@ -92,8 +92,10 @@ class ParticleEngine(Engine):
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
         """Describe the engine and its presets in one line."""
-        sections = [each.simulation for each in scenarios]
-        presets = [each.preset + " with overrides" * bool(each.overrides) for each in sections]
+        sections = [scenario.simulation for scenario in scenarios]
+        presets = [
+            section.preset + " with overrides" * bool(section.overrides) for section in sections
+        ]
         text = super().describe()
         return f"{text}, preset {', '.join(dict.fromkeys(presets))}" if presets else text
 
@@ -299,21 +301,21 @@ class BlastResult:
         law = self.calibration if calibration is None else calibration
         structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
-        named = {each.name: each for each in self.blast.scenario.structures}
+        named = {structure.name: structure for structure in self.blast.scenario.structures}
         return BlastLoads(
             structures=tuple(
                 StructureLoad.on(
-                    named[each.name],
+                    named[structure.name],
                     scaled.pa_s,
                     in_range=scaled.in_range,
                     notes=scaled.notes,
                     validation=_CALIBRATED
                     if scaled.in_range
                     else Validation(ValidationStatus.OUTSIDE, "; ".join(scaled.notes)),
-                    impulse_sim=each.impulse,
+                    impulse_sim=structure.impulse,
                 )
-                for each in structures
-                for scaled in [self.impulse(each.name, law)]
+                for structure in structures
+                for scaled in [self.impulse(structure.name, law)]
             ),
             module_impulse_sim=np.array(impulse, dtype=np.float64),
         )
@@ -326,7 +328,7 @@ class BlastResult:
         """
         charge = self.blast.scene.charge
         try:
-            return LoadUnit.of(self.obstacles, charge, lambda each: self.impulse(each.name))
+            return LoadUnit.of(self.obstacles, charge, lambda source: self.impulse(source.name))
         except BlastEnvError:
             return LoadUnit()
 

@@ -97,7 +97,9 @@ class PieceLoads:
         zone = scenario.build_zone
         if zone is None or not layout:
             return None
-        bodied = [(each, body) for each in layout if (body := zone.rigid_piece(each)) is not None]
+        bodied = [
+            (element, body) for element in layout if (body := zone.rigid_piece(element)) is not None
+        ]
         if not bodied:
             return None
         elements, bodies = zip(*bodied, strict=True)
@@ -106,7 +108,7 @@ class PieceLoads:
             for cell in zone.catalogue.cells(element):
                 owner[cell] = index
         table = run.table
-        barrier = next(k for k, each in enumerate(run.site.structures) if each.is_barrier)
+        barrier = next(k for k, structure in enumerate(run.site.structures) if structure.is_barrier)
         ways = tuple(_ways(scenario, elements, run.grid.cell_m))
         pushed = np.zeros((len(elements), len(WALLS)), dtype=bool)
         for way in ways:
@@ -134,10 +136,10 @@ class PieceLoads:
     def names(self) -> tuple[str, ...]:
         """Names of the pieces."""
         return tuple(
-            self.zone.piece_name(each)
-            if isinstance(each, Piece)
-            else module_name(*self.zone.element_rectangle_m(each).centre)
-            for each in self.elements
+            self.zone.piece_name(element)
+            if isinstance(element, Piece)
+            else module_name(*self.zone.element_rectangle_m(element).centre)
+            for element in self.elements
         )
 
     @cached_property
@@ -174,7 +176,7 @@ class PieceLoads:
         """Return the pieces that overturn by a time."""
         when_s = self.responses.overturn_s[self._worst]
         return tuple(
-            each for each, at_s in zip(self.elements, when_s, strict=True) if at_s <= end_s
+            element for element, at_s in zip(self.elements, when_s, strict=True) if at_s <= end_s
         )
 
     def history(self, name: str) -> "pd.DataFrame":

@@ -77,14 +77,14 @@ class WallHistories:
         from blast_env.gas.engine import face_table_of  # Numba takes half a second
 
         table = face_table_of(solver.grid, self._site)
-        names = [each.name for each in self._site.structures]
+        names = [structure.name for structure in self._site.structures]
         members = {}
         for building, structures in self._buildings.items():
             for index, wall in enumerate(WALLS):
                 parts = [
-                    names.index(each.name)
-                    for each in structures
-                    if wall in each.faces and each.name in names
+                    names.index(structure.name)
+                    for structure in structures
+                    if wall in structure.faces and structure.name in names
                 ]
                 chosen = np.flatnonzero(np.isin(table.structure, parts) & (table.face == index))
                 if len(chosen):
@@ -168,7 +168,7 @@ def record_of(result: GasOutcome, histories: WallHistories) -> BlastRecord:
     )
     record = BlastRecord(result.loads(), details, pieces=result.pieces)
     if result.bay_loads.bays:
-        bays = tuple(each.bay.name for each in result.bay_loads.bays)
+        bays = tuple(bay.bay.name for bay in result.bay_loads.bays)
         time_s, pressure_pa = result.bay_loads.histories
         record = replace(record, bays=bays, time_s=time_s, pressure_pa=pressure_pa)
     return record
@@ -194,13 +194,13 @@ def _building_load(
     """Return the load on a building from its row in the table of buildings."""
     faces, wall = result.on_walls, row["most_loaded_face"]
     counting = [
-        (faces["structure"] == each.name) & faces["face"].isin(each.faces)
-        for each in counted_parts(structures)
+        (faces["structure"] == counted_part.name) & faces["face"].isin(counted_part.faces)
+        for counted_part in counted_parts(structures)
     ]
     walls = faces[np.logical_or.reduce(counting)]
     pressure = histories.of(name, wall)
-    names = [each.name for each in structures]
-    in_range = all(result.impulse(each).in_range for each in names)
+    names = [structure.name for structure in structures]
+    in_range = all(result.impulse(name).in_range for name in names)
     counted = counted_peak(result.run.site, result.run.grid.cell_m, walls)
     return BuildingLoad(
         impulse_pa_s=row["impulse_pa_s"],
@@ -222,9 +222,9 @@ def _wall_loads(result: GasOutcome) -> Iterator[tuple[str, WallLoad]]:
     faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]
     for building, parts in buildings_of(result.blast.scenario.structures).items():
-        own = walls[walls["structure"].isin([each.name for each in parts])]
+        own = walls[walls["structure"].isin([part.name for part in parts])]
         if len(own):
-            impulses, peaks = (means_by_wall(own, each) for each in ("impulse_pa_s", "peak_pa"))
+            impulses, peaks = (means_by_wall(own, name) for name in ("impulse_pa_s", "peak_pa"))
             wall: Any = impulses.idxmax()
             yield building, WallLoad(wall, float(peaks[wall]), float(impulses[wall]))
 
@@ -235,9 +235,9 @@ def _notes(result: GasOutcome, loads: Mapping[str, BuildingLoad]) -> Iterator[st
     The checked range counts for protected buildings alone, capture for all.
     """
     for parts in buildings_of(result.blast.scenario.structures).values():
-        if any(each.protected for each in parts):
-            for each in parts:
-                yield from result.impulse(each.name).notes
+        if any(part.protected for part in parts):
+            for part in parts:
+                yield from result.impulse(part.name).notes
     yield from (f"{name}: {NOT_KNOWN}" for name, load in loads.items() if not load.known)
     yield from result.stepped_notes
     yield from result.gauge_notes

@@ -174,9 +174,9 @@ class Ladder:
         """Return the consequences of a severity, scaled from the nearest rung with a blast."""
         at = log(severity) / log(_STEP)
         known = {
-            number: each
-            for (by_distance, number), each in self._blasts.items()
-            if each is not None and (number == 0 or by_distance is nearer)
+            number: blast
+            for (by_distance, number), blast in self._blasts.items()
+            if blast is not None and (number == 0 or by_distance is nearer)
         }
         nearest = known[min(known, key=lambda number: abs(number - at))]
         return scaled_to(nearest, self.charge_at(severity, nearer))

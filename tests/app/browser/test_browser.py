@@ -123,9 +123,9 @@ class Page:
 
     def button(self, words: str) -> Any:
         def find() -> Any:
-            for each in self.all("button, .q-tab, .q-item"):
-                if each.is_displayed() and words in each.text.split("\n"):
-                    return each
+            for found in self.all("button, .q-tab, .q-item"):
+                if found.is_displayed() and words in found.text.split("\n"):
+                    return found
             return None
 
         return self.until(find)
@@ -168,14 +168,14 @@ class Page:
 
     def choose(self, label: str, option: str) -> None:
         """Choose an option of a select by their words."""
-        for each in self.all(".q-select"):
-            if each.is_displayed() and label in each.text.split("\n"):
-                each.click()
+        for found in self.all(".q-select"):
+            if found.is_displayed() and label in found.text.split("\n"):
+                found.click()
                 break
 
         def find() -> Any:
-            offered = [each for each in self.all(".q-menu .q-item") if each.is_displayed()]
-            return next((each for each in offered if each.text.strip().startswith(option)), None)
+            offered = [found for found in self.all(".q-menu .q-item") if found.is_displayed()]
+            return next((found for found in offered if found.text.strip().startswith(option)), None)
 
         self.until(find).click()
         sleep(0.4)
@@ -183,16 +183,16 @@ class Page:
 
     def showing(self, words: str) -> Any:
         """Return the select or option that begins with some words; `None` if none is there yet."""
-        for each in self.all(".q-menu .q-item, .q-dialog .q-select .q-field__native"):
-            if each.is_displayed() and each.text.strip().startswith(words):
-                return each
+        for found in self.all(".q-menu .q-item, .q-dialog .q-select .q-field__native"):
+            if found.is_displayed() and found.text.strip().startswith(words):
+                return found
         return None
 
     def fill(self, label: str, text: str) -> None:
         """Write into the field of a label, in the place of what is there."""
-        for each in self.all(".q-field"):
-            if each.is_displayed() and label in each.text:
-                field = each.find_element(By.TAG_NAME, "input")
+        for found in self.all(".q-field"):
+            if found.is_displayed() and label in found.text:
+                field = found.find_element(By.TAG_NAME, "input")
                 field.send_keys(Keys.CONTROL, "a")
                 field.send_keys(text)
                 return
@@ -204,7 +204,7 @@ class Page:
 
     def picture_widths(self) -> list[int]:
         """Return how wide the pictures are that are shown; 0 for one that is still to come."""
-        return [each.get_property("naturalWidth") for each in self.all(".be-card img")]
+        return [found.get_property("naturalWidth") for found in self.all(".be-card img")]
 
     def shoot(self, name: str) -> None:
         PICTURES.mkdir(parents=True, exist_ok=True)
@@ -213,7 +213,7 @@ class Page:
     def faults(self) -> list[str]:
         """Return what the browser complained about."""
         entries = self.driver.get_log("browser")
-        return [each["message"] for each in entries if each["level"] == "SEVERE"]
+        return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
 
 
 @pytest.fixture(scope="module")
@@ -352,7 +352,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     # Films that begin together, so that they show the same moment, are from memory.
     films = "img.be-film"
     page.until(
-        lambda: all(f"{each.get_attribute('src')}"[:5] == "blob:" for each in page.all(films))
+        lambda: all(f"{found.get_attribute('src')}"[:5] == "blob:" for found in page.all(films))
     )
     sleep(2.0)
     page.shoot("results_gas_film")
@@ -370,10 +370,10 @@ def test_numbers_are_read_as_they_are_meant_or_refused(page: Page) -> None:
     page.choose("selected", "charge")
 
     def shows_mass(shown: str) -> bool:
-        for each in page.all(".q-field"):
-            if each.is_displayed() and "mass (kg TNT)" in each.text:
-                number = each.find_element(By.TAG_NAME, "input").get_attribute("value")
-                unit = each.find_element(By.CSS_SELECTOR, ".q-field__suffix").text
+        for found in page.all(".q-field"):
+            if found.is_displayed() and "mass (kg TNT)" in found.text:
+                number = found.find_element(By.TAG_NAME, "input").get_attribute("value")
+                unit = found.find_element(By.CSS_SELECTOR, ".q-field__suffix").text
                 return f"{number} {unit}" == shown
         return False
 
@@ -396,7 +396,9 @@ def test_search_stop_keep_save_and_lose_nothing(page: Page, server: Server, tmp_
     page.choose("gas dynamics", "cells of 0.5 m")
     page.choose("by", "search: random")
     budget = next(
-        each for each in page.all("input[inputmode=numeric]") if each.get_attribute("value") == "50"
+        found
+        for found in page.all("input[inputmode=numeric]")
+        if found.get_attribute("value") == "50"
     )
     budget.send_keys(Keys.CONTROL, "a")
     budget.send_keys("5000")
@@ -599,7 +601,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
 
     def verdicts() -> list[str]:
         table = page.all(".be-results .q-table")[0]
-        return [each.text for each in table.find_elements(By.CSS_SELECTOR, "tbody tr")]
+        return [element.text for element in table.find_elements(By.CSS_SELECTOR, "tbody tr")]
 
     save_scenario(large_site(), tmp_path / "office_park.toml")
     page.open()
@@ -608,9 +610,11 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.until(lambda: page.all(".be-plan svg text"))
     reached("the site of the file")
     page.choose("selected", "office: office_west")
-    page.until(lambda: "office_west" in [each.get_property("value") for each in page.all("input")])
+    page.until(
+        lambda: "office_west" in [found.get_property("value") for found in page.all("input")]
+    )
     page.choose("windows", "window, 6 mm annealed")
-    page.until(lambda: any("6 mm annealed" in each.text for each in page.all(".q-select")))
+    page.until(lambda: any("6 mm annealed" in found.text for found in page.all(".q-select")))
     page.button("measure").click()
     page.sees("glass1, 1,000 cost units")
     page.shoot("large_measure")
@@ -632,7 +636,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.shoot("large_verdict")
     reached("the verdict of gas dynamics, without and with the layout")
     before = verdicts()
-    next(each for each in page.all(".q-toggle") if "glass1" in each.text).click()
+    next(found for found in page.all(".q-toggle") if "glass1" in found.text).click()
     page.until(lambda: len(verdicts()) == 2 and verdicts()[1] != before[1])
     assert verdicts()[0] == before[0]
     page.choose("picture", "damage of")
@@ -649,7 +653,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     before = dialog.text
     for words in ("coarse and fine", "coarse only"):  # Escape would close the dialog
         page.until(partial(page.showing, words)).click()
-    next(each for each in page.all(".q-toggle") if "contribution" in each.text).click()
+    next(found for found in page.all(".q-toggle") if "contribution" in found.text).click()
     page.until(lambda: dialog.text != before and "blasts of gas: about" in dialog.text)
     page.shoot("large_report_cost")
     page.button("begin").click()

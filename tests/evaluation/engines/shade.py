@@ -35,15 +35,15 @@ class ShadeEngine(Engine):
         """Return a load of 1,000 Pa s at 1 m, which falls with the distance of the centre."""
         x_m, y_m = charge_against(scenario, layout, charge).position_m
         loads = []
-        for each in scenario.structures:
-            left, bottom, right, top = each.rectangle_m
+        for structure in scenario.structures:
+            left, bottom, right, top = structure.rectangle_m
             distance_m = hypot(0.5 * (left + right) - x_m, 0.5 * (bottom + top) - y_m)
             loads.append(
                 StructureLoad.on(
-                    each,
+                    structure,
                     1000.0 / distance_m * self.share ** len(layout),
                     notes=("a formula, not a blast",),
                 )
             )
-        modules = [each.rows * each.columns for each in scenario.structures]
-        return BlastLoads(tuple(loads), np.repeat([each.impulse_pa_s for each in loads], modules))
+        modules = [structure.rows * structure.columns for structure in scenario.structures]
+        return BlastLoads(tuple(loads), np.repeat([load.impulse_pa_s for load in loads], modules))

@@ -55,12 +55,12 @@ def test_the_bays_of_a_wall_have_its_load(result: GasResult) -> None:
     sums = loads.recorder.history_pa @ loads.recorder.step_s
     in_bay = [
         whole[
-            (west["y_m"] >= each.bay.left_m)
-            & (west["y_m"] < each.bay.right_m)
-            & (west["z_m"] >= each.bay.floor_m)
-            & (west["z_m"] < each.bay.top_m)
+            (west["y_m"] >= bay.bay.left_m)
+            & (west["y_m"] < bay.bay.right_m)
+            & (west["z_m"] >= bay.bay.floor_m)
+            & (west["z_m"] < bay.bay.top_m)
         ].mean()
-        for each in loads.bays
+        for bay in loads.bays
     ]
     assert sums == pytest.approx(np.array(in_bay), rel=1e-4)
 
@@ -97,7 +97,7 @@ def strips(**narrow: Any) -> Scenario:
     (hut,) = document["structures"]
     strip = {**hut, "name": "strip", "corner_m": [6.0, 5.0], "rows": 1} | narrow
     del strip["facade"]
-    document["structures"] = [each | {"building": "hall"} for each in (hut, strip)]
+    document["structures"] = [case | {"building": "hall"} for case in (hut, strip)]
     return Scenario.from_document(document, "strips")
 
 

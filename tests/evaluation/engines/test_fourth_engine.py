@@ -70,7 +70,7 @@ def test_a_search_uses_up_the_stock_with_it() -> None:
     evaluator = BlastEvaluator(COURTYARD, "shade")
     problem = DesignProblem(evaluator, LoadCaseSet(COURTYARD, draw_threats(COURTYARD, range(1))))
     found = find_proposer("random").propose(problem, 8, seed=0)
-    best = max(found.history, key=lambda each: len(each.layout))
+    best = max(found.history, key=lambda step: len(step.layout))
     assert found.load == pytest.approx(problem.load(()) * 0.9 ** len(best.layout))
     assert evaluator.counts.blasts <= 9
 

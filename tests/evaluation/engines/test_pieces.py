@@ -74,7 +74,7 @@ def test_no_load_depends_on_what_holds_a_piece(result: GasResult) -> None:
     other = yard_with(mass_kg=300.0, friction=0.2)
     assert other.digest == result.digest
     scenarios = (other.blast.scenario, result.blast.scenario)
-    assert len({each.content_hash for each in scenarios}) == 1
+    assert len({scenario.content_hash for scenario in scenarios}) == 1
 
 
 def test_modules_are_pieces_and_walls_as_high_as_the_air_are_none() -> None:

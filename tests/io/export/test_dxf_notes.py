@@ -48,8 +48,8 @@ def notes_of(document: Drawing) -> MText:
 
 def outlines_of(document: Drawing, *layers: str) -> list[LWPolyline]:
     """Return the outlines on some layers."""
-    polylines = [each for each in document.modelspace() if isinstance(each, LWPolyline)]
-    return [each for each in polylines if each.dxf.layer in layers]
+    polylines = [entity for entity in document.modelspace() if isinstance(entity, LWPolyline)]
+    return [polyline for polyline in polylines if polyline.dxf.layer in layers]
 
 
 def points_of(outline: LWPolyline) -> list[PointM]:
@@ -161,7 +161,7 @@ def test_no_text_covers_another_or_a_module(name: str) -> None:
     labels = texts_of(plan, 0.6)
     for one, other in combinations([label.box_m for label in labels], 2):
         assert not one.overlaps(other)
-    pieces = [each for each in plan.features if each.kind is Kinds.BARRIER]
+    pieces = [feature for feature in plan.features if feature.kind is Kinds.BARRIER]
     for label in labels:
         if label.feature not in pieces:
             outlines = [Rectangle(*piece.places_m[0], *piece.places_m[2]) for piece in pieces]

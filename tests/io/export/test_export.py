@@ -41,8 +41,10 @@ def squares_m(layout: tuple[tuple[int, int], ...]) -> list[tuple[float, ...]]:
 
 def outlines(space: Modelspace, layer: str) -> list[LWPolyline]:
     """Return the closed outlines of a layer."""
-    found = [each for each in space if isinstance(each, LWPolyline) and each.dxf.layer == layer]
-    assert all(each.closed for each in found)
+    found = [
+        entity for entity in space if isinstance(entity, LWPolyline) and entity.dxf.layer == layer
+    ]
+    assert all(case.closed for case in found)
     return found
 
 
@@ -93,11 +95,11 @@ def test_geojson_has_closed_counterclockwise_polygons_in_site_metres(tmp_path: P
     assert road["geometry"] == {"type": "LineString", "coordinates": [[5.0, 6.0], [5.0, 24.0]]}
     (charge,) = by_kind["charge"]
     assert charge["geometry"] == {"type": "Point", "coordinates": [5.0, 11.25]}
-    assert [each["properties"]["name"] for each in by_kind["keep_out"]] == [
+    assert [case["properties"]["name"] for case in by_kind["keep_out"]] == [
         keep_out.reason for keep_out in COURTYARD.zone.keep_outs
     ]
     assert len(by_kind["build_zone"]) == len(by_kind["site"]) == 1
-    modules = [np.array(each["geometry"]["coordinates"][0]) for each in by_kind["barrier"]]
+    modules = [np.array(case["geometry"]["coordinates"][0]) for case in by_kind["barrier"]]
     assert [(*ring.min(axis=0), *ring.max(axis=0)) for ring in modules] == squares_m(LAYOUT)
 
 
@@ -110,9 +112,9 @@ def test_dxf_is_in_metres_with_a_layer_a_kind(tmp_path: Path) -> None:
     }
     space = document.modelspace()
     modules = outlines(space, "BARRIER")
-    corners = [np.array(corners_m(each)) for each in modules]
+    corners = [np.array(corners_m(module)) for module in modules]
     assert [(*c.min(axis=0), *c.max(axis=0)) for c in corners] == squares_m(LAYOUT)
-    identifiers = [each.get_xdata("BLAST_ENV")[0].value for each in modules]
+    identifiers = [module.get_xdata("BLAST_ENV")[0].value for module in modules]
     parts = build_scene(COURTYARD, LAYOUT).obstacles()[-1].parts
     assert identifiers == [part.module_id for part in parts]
     (building,) = outlines(space, "PROTECTED_STRUCTURE")
@@ -136,15 +138,15 @@ def test_every_part_of_a_site_is_in_every_drawing(name: str, tmp_path: Path) -> 
             "keep_out": len(zone.keep_outs),
             "cost_area": len(zone.cost_areas),
             "access_way": int(zone.access_way is not None),
-            "protected_structure": sum(each.protected for each in scenario.structures),
-            "structure": sum(not each.protected for each in scenario.structures),
+            "protected_structure": sum(structure.protected for structure in scenario.structures),
+            "structure": sum(not structure.protected for structure in scenario.structures),
             "charge_place": len(scenario.charge),
         }
     )
     content = json.loads(export_layout(empty, tmp_path / "site.geojson").read_text())
-    assert Counter(each["properties"]["kind"] for each in content["features"]) == expected
+    assert Counter(feature["properties"]["kind"] for feature in content["features"]) == expected
     space = readfile(export_layout(empty, tmp_path / "site.dxf")).modelspace()
-    drawn = Counter(each.dxf.layer.lower() for each in space if each.dxftype() != "TEXT")
+    drawn = Counter(entity.dxf.layer.lower() for entity in space if entity.dxftype() != "TEXT")
     drawn -= Counter({"notes": 1, "clearance": drawn["clearance"]})  # about the site, not on it
     assert drawn == expected
     assert pd.read_csv(export_layout(empty, tmp_path / "site.csv")).empty

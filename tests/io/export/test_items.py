@@ -78,8 +78,8 @@ def test_geojson_has_pieces_with_item_height_and_cost(tmp_path: Path) -> None:
     for feature in content["features"]:
         of_kind.setdefault(feature["properties"]["kind"], []).append(feature["properties"])
     pieces = of_kind["barrier"]
-    assert [each["name"] for each in pieces] == NAMES
-    assert [(each["item"], each["height_m"]) for each in pieces] == [
+    assert [piece["name"] for piece in pieces] == NAMES
+    assert [(piece["item"], piece["height_m"]) for piece in pieces] == [
         ("wall", 2.0),
         ("wall", 2.0),
         ("post", 1.0),
@@ -95,12 +95,16 @@ def test_dxf_has_pieces_as_high_as_they_are_with_their_names(tmp_path: Path) -> 
     assert not document.audit().has_issues
     space = document.modelspace()
     barriers = [
-        each for each in space if isinstance(each, LWPolyline) and each.dxf.layer == "BARRIER"
+        entity
+        for entity in space
+        if isinstance(entity, LWPolyline) and entity.dxf.layer == "BARRIER"
     ]
-    assert [each.dxf.thickness for each in barriers] == [2.0, 2.0, 1.0]
-    said = [[tag.value for tag in each.get_xdata("BLAST_ENV")] for each in barriers]
+    assert [barrier.dxf.thickness for barrier in barriers] == [2.0, 2.0, 1.0]
+    said = [[tag.value for tag in barrier.get_xdata("BLAST_ENV")] for barrier in barriers]
     assert said[0] == [NAMES[0], "item=wall", "height_m=2"]
-    texts = [(each.dxf.text, each.dxf.rotation) for each in space.query('TEXT[layer=="ITEMS"]')]
+    texts = [
+        (entity.dxf.text, entity.dxf.rotation) for entity in space.query('TEXT[layer=="ITEMS"]')
+    ]
     assert texts == [("wall 2 m", 90.0), ("wall 2 m", 90.0), ("post 1 m", 0.0)]
     (notes,) = space.query('*[layer=="NOTES"]')
     lines = " ".join(notes.plain_text(split=True))  # type: ignore[attr-defined]
