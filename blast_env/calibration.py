@@ -18,9 +18,9 @@ from blast_env.particles.calibration.laws import (
     shape_rms_percent,
 )
 from blast_env.particles.calibration.model import (
-    CalibratedLoad,
     Calibration,
     CalibrationError,
+    LoadCalibration,
     LoadUnit,
     load_calibration,
     save_calibration,
@@ -37,7 +37,6 @@ from blast_env.results import ScaledImpulse
 __all__ = [
     "PAPER_COLUMNS",
     "PAPER_UFC_LABEL",
-    "CalibratedLoad",
     "Calibration",
     "CalibrationError",
     "FewDistancesWarning",
@@ -45,6 +44,7 @@ __all__ = [
     "Friedlander",
     "LeaveOneOut",
     "LinearLaw",
+    "LoadCalibration",
     "LoadUnit",
     "PowerLaw",
     "ProportionalLaw",

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 
-class Hashed(Enum):
+class HashMark(Enum):
     """Mark of a field in its annotation; fields without one count in all hashes."""
 
     NEVER = "no result depends on it"
@@ -20,19 +20,19 @@ class Hashed(Enum):
     NOT_OF_PLACES = "does not count for the meaning of a layout"
 
 
-def fields_with(model: type[BaseModel], mark: Hashed) -> set[str]:
+def fields_with(model: type[BaseModel], mark: HashMark) -> set[str]:
     """Return the names of the fields of a model with a mark."""
     return {name for name, field in model.model_fields.items() if mark in _marks(field)}
 
 
-def hashed_content(section: BaseModel, *left_out: Hashed) -> dict[str, Any]:
+def hashed_content(section: BaseModel, *left_out: HashMark) -> dict[str, Any]:
     """Return the content of a section that counts in a hash, as plain JSON values.
 
     Args:
         section: The section, with its subsections.
         left_out: Marks of fields that do not count, beside `NEVER` and defaults of `IF_SET`.
     """
-    return _counted(section, section.model_dump(mode="json"), {Hashed.NEVER, *left_out})
+    return _counted(section, section.model_dump(mode="json"), {HashMark.NEVER, *left_out})
 
 
 def digest_of(content: Mapping[str, Any]) -> str:
@@ -41,24 +41,24 @@ def digest_of(content: Mapping[str, Any]) -> str:
     return sha256(text.encode()).hexdigest()
 
 
-def _marks(field: FieldInfo) -> set[Hashed]:
-    return {mark for mark in field.metadata if isinstance(mark, Hashed)}
+def _marks(field: FieldInfo) -> set[HashMark]:
+    return {mark for mark in field.metadata if isinstance(mark, HashMark)}
 
 
-def _counted(section: BaseModel, dump: Any, left_out: Collection[Hashed]) -> dict[str, Any]:
+def _counted(section: BaseModel, dump: Any, left_out: Collection[HashMark]) -> dict[str, Any]:
     """Return the entries of a dump that count; sparse sections have no entry for some fields."""
     counted = {}
     for name, field in type(section).model_fields.items():
         marks, value = _marks(field), getattr(section, name)
         is_default = value == field.get_default(call_default_factory=True)
         if name in dump and not (
-            marks.intersection(left_out) or (Hashed.IF_SET in marks and is_default)
+            marks.intersection(left_out) or (HashMark.IF_SET in marks and is_default)
         ):
             counted[name] = _of_value(value, dump[name], left_out)
     return counted
 
 
-def _of_value(value: Any, dump: Any, left_out: Collection[Hashed]) -> Any:
+def _of_value(value: Any, dump: Any, left_out: Collection[HashMark]) -> Any:
     if isinstance(value, BaseModel):
         return _counted(value, dump, left_out)
     if isinstance(value, Mapping):

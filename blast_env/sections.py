@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from blast_env.geometry import Rectangle
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import plain_text
 
@@ -107,4 +107,4 @@ class Ground(Section):
 class Area(Ground):
     """A rectangle of the site under a special condition, with the reason."""
 
-    reason: Annotated[Reason, Hashed.NEVER]
+    reason: Annotated[Reason, HashMark.NEVER]

@@ -66,7 +66,7 @@ QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
 @dataclass(frozen=True)
-class MeasuredSite:
+class SiteMeasurement:
     """Results of blasts on a site.
 
     Attributes:
@@ -112,7 +112,7 @@ def measured(
     threats: int,
     engine: str | Engine,
     criterion: SiteCriterion | None = None,
-) -> MeasuredSite:
+) -> SiteMeasurement:
     """Measure a site with blasts of charges drawn from its threat.
 
     Args:
@@ -133,7 +133,7 @@ def measured(
     reduction = {
         layout: 1.0 - problem.load(layout) / unprotected for layout in (*layouts, *ruled.values())
     }
-    return MeasuredSite(
+    return SiteMeasurement(
         accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
         unprotected_pa_s=problem.evaluator.loads((), drawn[0]).protected_impulse_pa_s,
@@ -206,7 +206,7 @@ def main(
         print_agreement(results)
 
 
-def print_measured(results: Sequence[MeasuredSite]) -> None:
+def print_measured(results: Sequence[SiteMeasurement]) -> None:
     """Print the results of blasts on the sites that the criterion accepts."""
     reduction = np.array([result.reduction for result in results])
     columns = {
@@ -226,7 +226,7 @@ def print_measured(results: Sequence[MeasuredSite]) -> None:
         print_row(name, *(f"{value:.0f}" for value in np.quantile(values, QUANTILES)))
 
 
-def print_agreement(results: Sequence[MeasuredSite]) -> None:
+def print_agreement(results: Sequence[SiteMeasurement]) -> None:
     """Print the agreement between lines of sight and blasts."""
     faults = ("", *dict.fromkeys(result.fault for result in results if result.fault))
     print_row("by lines of sight", *(fault or "worth solving by blasts" for fault in faults))

@@ -97,7 +97,7 @@ class DemoSettings:
 
 
 @dataclass(eq=False)
-class CorrectedReward:
+class RewardCorrection:
     """The guessed reduction, corrected by blasts of similar layouts, at the end; a `Reward`.
 
     Attributes:
@@ -161,7 +161,7 @@ class DemoTraining:
     def __post_init__(self) -> None:
         threats = one_of_each_charge(draw_threats(self.scenario, range(16)))
         self._case, self._judge = LoadCaseSet(self.scenario, threats), Evaluators(JUDGE)
-        self.reward = CorrectedReward(site_of(self.scenario))
+        self.reward = RewardCorrection(site_of(self.scenario))
         engine = SurrogateEngine()
         in_training, self._env = (
             BlastBarrierEnv(

@@ -23,8 +23,8 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.facade import (
     BAY_M,
     Bay,
+    FacadeBay,
     FacadeResponse,
-    FilledBay,
     peak_corrected,
     peak_factor,
     respond,
@@ -196,12 +196,12 @@ def facade_on(site: Scenario, cell_m: float) -> FacadeResponse:
     return loads.response
 
 
-def filled_with(bays: list[Bay], name: str) -> list[FilledBay]:
+def filled_with(bays: list[Bay], name: str) -> list[FacadeBay]:
     """Return bays with a component of the catalogue."""
     component = catalogue()[name]
     if isinstance(component, Glazing):
-        return [FilledBay(bay, glazing=component) for bay in bays]
-    return [FilledBay(bay, wall=component) for bay in bays]
+        return [FacadeBay(bay, glazing=component) for bay in bays]
+    return [FacadeBay(bay, wall=component) for bay in bays]
 
 
 def reflected_peaks_pa(

@@ -20,7 +20,7 @@ from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
-from blast_env.design.search.learnt import Guesses, LearntSearch, improved
+from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved
 from blast_env.design.search.moves import Moves, random_walls
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
@@ -232,7 +232,7 @@ def calibrate(
         with progress_bar("fits") as progress:
             found = run_all(fold, held_out, processes, progress)
         impulse, peak = (
-            HeldOut.of(samples, loads, held_out, [result[index] for result in found])
+            Holdout.of(samples, loads, held_out, [result[index] for result in found])
             for index, loads in enumerate((samples.impulse, samples.peak))
         )
         sites = f"{len(np.unique(samples.site))} held-out sites"
@@ -249,7 +249,7 @@ def calibrate(
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
+class Holdout:
     """Predictions of one kind of load by fits without the sample's site, and what they show.
 
     Attributes:
@@ -269,7 +269,7 @@ class HeldOut:
         loads: Loads,
         held_out: Sequence[BoolArray],
         found: Sequence[Predictions],
-    ) -> "HeldOut":
+    ) -> "Holdout":
         """Join the predictions of all folds."""
         logs, spreads = np.empty(len(samples)), np.empty(len(samples))
         for out_of, (own_logs, own_spreads) in zip(held_out, found, strict=True):
@@ -395,7 +395,7 @@ def verdict(
     processes: int = 1,
 ) -> LayoutsJudged:
     """Judge the surrogate's proposal after a number of changes, and the rules' layouts."""
-    scenario, search = evaluator.scenario, LearntSearch(surrogate, changes=changes)
+    scenario, search = evaluator.scenario, SurrogateSearch(surrogate, changes=changes)
     began_s = perf_counter()
     proposed = search.at_once(scenario, threat.charge)
     ms = MS_PER_S * (perf_counter() - began_s)

@@ -95,14 +95,14 @@ def _first_line(found: AdviceResult, best: Advice) -> str:
 def advice_figure(advice: AdviceResult) -> "Figure":
     """Return the figure of cost against level of protection, of all layouts tried and judged."""
     # Here, because pictures need the extra `render`.
-    from blast_env.plots.cost_level import PricedDamage, cost_level_figure
+    from blast_env.plots.cost_level import DamagePrice, cost_level_figure
 
     judge, scenario = advice.judge, advice.judge.scenario
     tried = {
-        str(own.kind): [PricedDamage(x.cost, x.damage) for x in own.tried] for own in advice.found
+        str(own.kind): [DamagePrice(x.cost, x.damage) for x in own.tried] for own in advice.found
     }
     searched = {
-        x.layout: PricedDamage(x.cost, x.damage) for part in advice.found for x in part.tried
+        x.layout: DamagePrice(x.cost, x.damage) for part in advice.found for x in part.tried
     }
     pairs = [
         (searched[layout], searched[layout]._replace(damage=seen.worst_damage(scenario)))

@@ -10,13 +10,13 @@ from blast_env.benchmark.definitions import (
 )
 from blast_env.benchmark.judging import (
     JUDGE_CELL_M,
-    JudgedRun,
-    JudgedSubmission,
+    RunJudgement,
+    SubmissionJudgement,
     judge,
     shipped_standings,
 )
-from blast_env.benchmark.problem import BenchmarkProblem, EvaluatedLayout, make
-from blast_env.benchmark.references import KnownLayout, ScoreReference, stored_references
+from blast_env.benchmark.problem import BenchmarkProblem, LayoutValue, make
+from blast_env.benchmark.references import ReferenceLayout, ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
 from blast_env.benchmark.standings import standings_page, standings_tables
 from blast_env.benchmark.submissions import Method, Run, RunGrid, Submission, play
@@ -28,16 +28,16 @@ __all__ = [
     "SEEDS",
     "BenchmarkProblem",
     "Definition",
-    "EvaluatedLayout",
-    "JudgedRun",
-    "JudgedSubmission",
-    "KnownLayout",
     "LayoutSpace",
+    "LayoutValue",
     "Method",
+    "ReferenceLayout",
     "Run",
     "RunGrid",
+    "RunJudgement",
     "ScoreReference",
     "Submission",
+    "SubmissionJudgement",
     "judge",
     "make",
     "play",

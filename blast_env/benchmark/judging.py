@@ -45,7 +45,7 @@ _SAME: Final = 1e-9
 
 
 @dataclass(frozen=True)
-class JudgedRun(Run):
+class RunJudgement(Run):
     """A replayed run; further attributes as in `Run`.
 
     Attributes:
@@ -62,7 +62,7 @@ class JudgedRun(Run):
     def score(self) -> float:
         """Score: 0 for the best rule or worse, 1 for the best known layout, above 1 if better.
 
-        It forgets how much worse: `JudgedSubmission.lead` ranks, which does not.
+        It forgets how much worse: `SubmissionJudgement.lead` ranks, which does not.
         """
         gain = self.rule - self.share
         if self.rule - self.best < _SAME:
@@ -71,7 +71,7 @@ class JudgedRun(Run):
 
 
 @dataclass(frozen=True)
-class JudgedSubmission:
+class SubmissionJudgement:
     """A replayed submission; the table of standings is made from files of these.
 
     Attributes:
@@ -88,12 +88,12 @@ class JudgedSubmission:
     method: MethodName
     cell_m: Annotated[float, Field(ge=0.01, le=100.0)]
     engine: Annotated[str, Field(max_length=500)]
-    runs: Annotated[tuple[JudgedRun, ...], Field(min_length=1, max_length=MOST_RUNS)]
+    runs: Annotated[tuple[RunJudgement, ...], Field(min_length=1, max_length=MOST_RUNS)]
     note: Note = ""
     format: Literal["blast-env judged 1"] = FORMAT
 
     @classmethod
-    def load(cls, path: str | Path) -> "JudgedSubmission":
+    def load(cls, path: str | Path) -> "SubmissionJudgement":
         """Read a file.
 
         Raises:
@@ -145,7 +145,7 @@ class JudgedSubmission:
         return p_value_of_mean(self._means(budget, lambda run: run.rule - run.share, -1.0))
 
     def _by_problem(
-        self, budget: int, value: Callable[[JudgedRun], float], missing: float
+        self, budget: int, value: Callable[[RunJudgement], float], missing: float
     ) -> list[list[float]]:
         """Return a value of the runs with a budget, by problem."""
         found: dict[str, list[float]] = {name: [] for name in self.problems}
@@ -154,11 +154,13 @@ class JudgedSubmission:
                 found[run.problem].append(value(run))
         return [item or [missing] for item in found.values()]
 
-    def _mean(self, budget: int, value: Callable[[JudgedRun], float], missing: float) -> Estimate:
+    def _mean(
+        self, budget: int, value: Callable[[RunJudgement], float], missing: float
+    ) -> Estimate:
         return mean_estimate(self._means(budget, value, missing))
 
     def _means(
-        self, budget: int, value: Callable[[JudgedRun], float], missing: float
+        self, budget: int, value: Callable[[RunJudgement], float], missing: float
     ) -> FloatArray:
         """Return the mean value of the runs with a budget for each problem (problems,)."""
         return np.array([np.mean(runs) for runs in self._by_problem(budget, value, missing)])
@@ -173,7 +175,7 @@ def judge(
     definitions: Mapping[str, Definition] = DEFINITIONS,
     references: Mapping[str, ScoreReference] | None = None,
     progress: Callable[[float], None] | None = None,
-) -> JudgedSubmission:
+) -> SubmissionJudgement:
     """Replay a submission by gas dynamics.
 
     Equal layouts run once. The best rule and the best known layout run with the same cells, unless
@@ -198,7 +200,7 @@ def judge(
     by_problem: dict[str, list[Run]] = defaultdict(list)
     for run in submission.runs:
         by_problem[run.problem].append(run)
-    judged: list[JudgedRun] = []
+    judged: list[RunJudgement] = []
     for index, (name, runs) in enumerate(by_problem.items()):
         if name not in known:
             raise BlastEnvError(
@@ -208,7 +210,7 @@ def judge(
         judged += _judged(definitions[name], runs, known[name], evaluator, cell_m, processes)
         if progress is not None:
             progress((index + 1) / len(by_problem))
-    return JudgedSubmission(
+    return SubmissionJudgement(
         submission.method,
         0.5 if cell_m is None else cell_m,
         found.version,
@@ -224,7 +226,7 @@ def _judged(
     evaluator: BlastEvaluator,
     cell_m: float | None,
     processes: int,
-) -> Iterator[JudgedRun]:
+) -> Iterator[RunJudgement]:
     cell = "" if cell_m is None else cell_key(cell_m)
     stored = {
         run.layout: run.shares[cell]
@@ -237,7 +239,7 @@ def _judged(
     shares = dict(zip(layouts, found, strict=True)) | stored
     rule, best = (shares[run.layout] for run in (reference.rule, reference.best))
     for run in runs:
-        yield JudgedRun(**vars(run), share=shares[run.layout], rule=rule, best=best)
+        yield RunJudgement(**vars(run), share=shares[run.layout], rule=rule, best=best)
 
 
 def read_submission(path: Path) -> Submission:
@@ -246,9 +248,9 @@ def read_submission(path: Path) -> Submission:
     Raises:
         BlastEnvError: If it is damaged, or no submission to these problems.
     """
-    kinds: tuple[type[Any], ...] = (Submission, JudgedSubmission)
+    kinds: tuple[type[Any], ...] = (Submission, SubmissionJudgement)
     found: Any = read_runs(path, *kinds)
-    submission: Submission = found.submission if isinstance(found, JudgedSubmission) else found
+    submission: Submission = found.submission if isinstance(found, SubmissionJudgement) else found
     try:
         submission.check()
     except BlastEnvError as error:
@@ -256,13 +258,13 @@ def read_submission(path: Path) -> Submission:
     return submission
 
 
-def shipped_standings() -> tuple[JudgedSubmission, ...]:
+def shipped_standings() -> tuple[SubmissionJudgement, ...]:
     """Return the bundled judged submissions."""
     folder = files("blast_env.benchmark").joinpath("data/standings")
     if not folder.is_dir():
         return ()
     found = (path for path in folder.iterdir() if path.name.endswith(".json"))
     return tuple(
-        checked_as(JudgedSubmission, parse_json(path.read_text("utf-8")))
+        checked_as(SubmissionJudgement, parse_json(path.read_text("utf-8")))
         for path in sorted(found, key=lambda path: path.name)
     )

@@ -8,8 +8,8 @@ from blast_env.benchmark import (
     BUDGETS,
     BenchmarkProblem,
     Definition,
-    KnownLayout,
     Method,
+    ReferenceLayout,
     ScoreReference,
     Submission,
 )
@@ -190,5 +190,8 @@ def reference_of(
         definition.digest,
         engine_key(evaluator.engine),
         {name: shares[name] for name in rules},
-        *(KnownLayout(layout, known[layout], {cell: shares[layout]}) for layout in (rule, best)),
+        *(
+            ReferenceLayout(layout, known[layout], {cell: shares[layout]})
+            for layout in (rule, best)
+        ),
     )

@@ -31,7 +31,7 @@ _MOST_REPEATS: Final = 200
 
 
 @dataclass(frozen=True)
-class EvaluatedLayout:
+class LayoutValue:
     """An evaluated layout.
 
     Attributes:
@@ -60,7 +60,7 @@ class BenchmarkProblem(DesignProblem):
     """
 
     definition: Definition
-    history: list[EvaluatedLayout] = field(default_factory=list, init=False)
+    history: list[LayoutValue] = field(default_factory=list, init=False)
     _repeats: int = field(default=0, init=False, repr=False)
 
     @property
@@ -104,7 +104,7 @@ class BenchmarkProblem(DesignProblem):
         return self.most_blasts - self.blasts
 
     @property
-    def best(self) -> EvaluatedLayout | None:
+    def best(self) -> LayoutValue | None:
         """The best of the layouts evaluated with most threats; `None` before the first."""
         return min(self.history, key=lambda step: (-step.threats, step.share), default=None)
 
@@ -125,7 +125,7 @@ class BenchmarkProblem(DesignProblem):
         met = replace(self.case, threats=self.case.threats[: found.threats])
         unprotected = met.objective_value(self.unprotected[: found.threats], ())
         share = found.load / unprotected
-        self.history.append(EvaluatedLayout(found.layout, share, found.threats, found.blasts))
+        self.history.append(LayoutValue(found.layout, share, found.threats, found.blasts))
 
     def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
         """Return the reasons why a layout is illegal, one sentence each; none if it is legal.
@@ -177,7 +177,7 @@ class BenchmarkProblem(DesignProblem):
             raise BudgetError(f"{self.name}: {_MOST_REPEATS} evaluations without a new blast")
         met = replace(self.case, threats=self.case.threats[:count])
         (share,) = shares_of(met, [checked], self.evaluator)
-        self.history.append(EvaluatedLayout(checked, share, count, self.blasts))
+        self.history.append(LayoutValue(checked, share, count, self.blasts))
         return share
 
     def judged(self, layout: Sequence[Element], processes: int = 1) -> float:

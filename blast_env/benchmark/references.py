@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
-class KnownLayout:
+class ReferenceLayout:
     """A layout with the shares of the load that remain.
 
     Attributes:
@@ -51,8 +51,8 @@ class ScoreReference:
     digest: str
     engine: str
     rules: dict[str, Share]
-    rule: KnownLayout
-    best: KnownLayout
+    rule: ReferenceLayout
+    best: ReferenceLayout
 
 
 def engine_key(engine: Engine) -> str:
@@ -61,7 +61,7 @@ def engine_key(engine: Engine) -> str:
 
 
 def cell_key(cell_m: float) -> str:
-    """Return the key of `KnownLayout.shares` for a side of the cells in m."""
+    """Return the key of `ReferenceLayout.shares` for a side of the cells in m."""
     return f"{cell_m:g}"
 
 

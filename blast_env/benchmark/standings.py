@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.answers.document import Table
 from blast_env.benchmark.definitions import DEFINITIONS
-from blast_env.benchmark.judging import JudgedSubmission
+from blast_env.benchmark.judging import SubmissionJudgement
 from blast_env.statistics import Estimate, holm_adjusted
 from blast_env.tables import markdown_table
 from blast_env.values import markup_text
@@ -25,9 +25,9 @@ _NAMED = 3
 """Most problems that a title names."""
 
 
-def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[Table]:
+def standings_tables(judged: Sequence[SubmissionJudgement]) -> Iterator[Table]:
     """Yield a table for each set of problems and size of the judge's cells."""
-    groups: dict[tuple[tuple[str, ...], float], list[JudgedSubmission]] = {}
+    groups: dict[tuple[tuple[str, ...], float], list[SubmissionJudgement]] = {}
     for judged_submission in judged:
         groups.setdefault(
             (tuple(sorted(judged_submission.problems)), judged_submission.cell_m), []
@@ -36,7 +36,7 @@ def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[Table]:
         yield _table(own, problems, cell_m)
 
 
-def standings_page(judged: Sequence[JudgedSubmission]) -> str:
+def standings_page(judged: Sequence[SubmissionJudgement]) -> str:
     """Return the page of the documentation with the standings, in Markdown."""
     parts = [_HEAD]
     for table in standings_tables(judged):
@@ -56,7 +56,7 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
     return "\n".join(parts)
 
 
-def _table(judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float) -> Table:
+def _table(judged: Sequence[SubmissionJudgement], problems: Sequence[str], cell_m: float) -> Table:
     """Return the table of submissions to the same problems, the largest lead first."""
     runs = {run.problem: run for entry in judged for run in entry.runs}.values()
     rule, best = (

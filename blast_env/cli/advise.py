@@ -15,9 +15,9 @@ from blast_env.cli.options import (
     CacheOption,
     CellOption,
     CellsOption,
+    ChargeInput,
     ChargeOption,
     DrawsOption,
-    GivenCharge,
     MassErrorOption,
     ProcessesOption,
     ScenarioArgument,
@@ -85,7 +85,7 @@ def advise(
     """
     level = wanted_level(target, load_scenario(scenario), LevelOfProtection.MEDIUM)
     site = site_with_target(load_scenario(scenario), level, target_probability, budget_cost)
-    threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
+    threats = ChargeInput.of(charge, tnt_kg).threats(site, charges)
     if budget < len(threats):
         raise BlastEnvError(
             f"budget is {budget} blasts, must be at least {len(threats)}: one per charge"

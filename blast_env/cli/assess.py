@@ -20,11 +20,11 @@ from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     CacheOption,
+    ChargeInput,
     ChargeOption,
     DrawsOption,
     FinalCellOption,
     FinalCellsOption,
-    GivenCharge,
     GlazingOption,
     LayoutOption,
     MassErrorOption,
@@ -63,7 +63,7 @@ from blast_env.site.presets import (
     EQUIVALENTS_SOURCE,
     PRESETS_SOURCE,
     TNT_EQUIVALENTS,
-    NamedMass,
+    MassPreset,
 )
 from blast_env.tables import write_csv
 from blast_env.values import count_of
@@ -157,7 +157,7 @@ def assess(
         _screen(site, last, mass, required, engine if gas else None, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
-    threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
+    threats = ChargeInput.of(charge, tnt_kg).threats(site, charges)
     drawn = [threat.charge for threat in threats]
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
@@ -209,7 +209,7 @@ def _screen(
     """Print the level of protection of each facade, and the stand-off that each level needs."""
     level = scenario.objective.level or LevelOfProtection.LOW
     required = required or [Requirement.of_level(level)]
-    named = [NamedMass.parsed(mass) for mass in masses]
+    named = [MassPreset.parsed(mass) for mass in masses]
     found = screen_site(scenario, layout, named)
     beside = {} if engine is None else _by_gas(scenario, layout, found, engine)
     print_parts(screening_answer(scenario, layout, found, required, beside))

@@ -15,12 +15,12 @@ from blast_env.cli.command import Target, note_target, writes
 from blast_env.cli.options import (
     SCENARIO_HELP,
     CacheOption,
+    ChargeInput,
     ChargeOption,
     ClusterAddress,
     EngineChoice,
     FinalCellOption,
     FinalCellsOption,
-    GivenCharge,
     JsonOption,
     ProcessesOption,
     TntOption,
@@ -91,7 +91,7 @@ def evaluate(
     difference gives the grid error beside each number.
     """
     check_cvar_level(cvar_level)
-    given = GivenCharge.of(charge, tnt_kg)
+    given = ChargeInput.of(charge, tnt_kg)
     drawn = SeedRange.TEST.seeds(0, seeds)
     if first_seed is not None:
         drawn = range(first_seed, first_seed + seeds)

@@ -17,11 +17,11 @@ from blast_env.benchmark import (
     JUDGE_CELL_M,
     BenchmarkProblem,
     Definition,
-    JudgedSubmission,
     Method,
     RunGrid,
     ScoreReference,
     Submission,
+    SubmissionJudgement,
     make,
     play,
     secret_sites,
@@ -174,9 +174,9 @@ def _methods(
         with import_extra("agents", "trained agents"):
             from blast_agents.training import load_agent
 
-            from blast_env.design.search.learnt import LearntSearch
+            from blast_env.design.search.learnt import SurrogateSearch
     for run in runs:
-        agent = LearntSearch(agent=load_agent(run))
+        agent = SurrogateSearch(agent=load_agent(run))
         yield f"agent {run.resolve().name}", method_of(agent), asked or BUDGETS[:2]
 
 
@@ -217,7 +217,7 @@ class _Judging:
         submission: Submission,
         definitions: Mapping[str, Definition],
         references: Mapping[str, ScoreReference],
-    ) -> JudgedSubmission:
+    ) -> SubmissionJudgement:
         """Judge a submission."""
         with progress_bar(f"judging {submission.method}") as progress:
             judged = judge_submission(

@@ -197,7 +197,7 @@ def wanted_level(
 
 
 @dataclass(frozen=True)
-class GivenCharge:
+class ChargeInput:
     """The place and the mass of the charge, where the user gives them.
 
     Attributes:
@@ -209,7 +209,7 @@ class GivenCharge:
     mass_kg: float | None
 
     @classmethod
-    def of(cls, charge: str | None, tnt_kg: float | None) -> "GivenCharge":
+    def of(cls, charge: str | None, tnt_kg: float | None) -> "ChargeInput":
         """Return the charge of the options `--charge` and `--tnt-kg`; refuse two masses."""
         if charge is None:
             return cls(None, tnt_kg)

@@ -20,10 +20,10 @@ from blast_env.cli.options import (
     CacheOption,
     CellOption,
     CellsOption,
+    ChargeInput,
     ChargeOption,
     ClusterAddress,
     EngineChoice,
-    GivenCharge,
     ProcessesOption,
     TntOption,
     refuse_given,
@@ -154,7 +154,7 @@ def search(
     nothing is proposed if the expected reduction is below 3 %. Without --charge, that layout is for
     all possible places of the charge.
     """
-    given = GivenCharge.of(charge, tnt_kg)
+    given = ChargeInput.of(charge, tnt_kg)
     if method == PACKAGE:
         refuse_given(context, _WITH_BLASTS, f"does not apply to --method {PACKAGE}")
         found = _package_proposal(load_scenario(scenario), given, cells, processes, out)
@@ -404,7 +404,7 @@ def _risk_text(problem: DesignProblem) -> str:
 
 
 def _package_proposal(
-    scenario: Scenario, given: GivenCharge, cells: str | None, processes: int, out: Path | None
+    scenario: Scenario, given: ChargeInput, cells: str | None, processes: int, out: Path | None
 ) -> tuple[DesignProblem, Layout]:
     """Propose a layout without a blast, print it, and write it; return it with its problem."""
     scenario.zone  # noqa: B018  # refuses a scenario without one
@@ -431,7 +431,7 @@ def _package_proposal(
     return problem, result.layout
 
 
-def _given_charge(scenario: Scenario, given: GivenCharge) -> AnyCharge | None:
+def _given_charge(scenario: Scenario, given: ChargeInput) -> AnyCharge | None:
     """Return the charge at the user's place; `None` without one."""
     if given.place_m is None:
         if given.mass_kg is not None:

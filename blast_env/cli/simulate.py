@@ -16,9 +16,9 @@ from blast_env.cli.options import (
     UNTIL_HELP,
     CellOption,
     CellsOption,
+    ChargeInput,
     ChargeOption,
     EngineChoice,
-    GivenCharge,
     JsonOption,
     LayoutOption,
     ScenarioArgument,
@@ -115,7 +115,7 @@ def simulate(
     Each picture shows the same for either engine: --film the spread of the blast, --heat-map the
     places of the load, --history its course over time.
     """
-    given = GivenCharge.of(charge, tnt_kg)
+    given = ChargeInput.of(charge, tnt_kg)
     own = load_scenario(scenario)
     site = own if stand_off_m is None else own.at_stand_off(stand_off_m)
     site = site.with_simulation(preset)

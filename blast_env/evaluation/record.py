@@ -26,7 +26,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.site import AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
-from blast_env.site.facade import NamedBay
+from blast_env.site.facade import BayComponents
 from blast_env.site.structures import StructureSection
 from blast_env.statistics import counted_parts, mean_over_area
 
@@ -155,7 +155,7 @@ class BlastLoads:
     module_impulse_sim: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def with_facades(
-        self, named: Collection[NamedBay], objective: ObjectiveSection
+        self, named: Collection[BayComponents], objective: ObjectiveSection
     ) -> "BlastLoads":
         """Return the loads with the response of given facades, without another blast.
 
@@ -262,7 +262,7 @@ class BlastLoads:
 
 
 def structure_response(
-    bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
+    bays: Collection[BayDamage], named: Collection[BayComponents], objective: ObjectiveSection
 ) -> tuple[float, float]:
     """Return the response of one structure in the objective, and the largest damage of its bays.
 
@@ -342,7 +342,7 @@ def _division(facade: Any) -> tuple[float | int | None, ...]:
     return facade.storey_m, facade.storeys, facade.bay_m
 
 
-class UnjudgedWalls(NamedTuple):
+class WallsWithoutVerdict(NamedTuple):
     """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
 
     Attributes:
@@ -435,7 +435,7 @@ class BlastDetails:
     buildings: dict[str, BuildingLoad]
     walls: dict[str, WallLoad]
     unchecked: tuple[tuple[str, str], ...]
-    unjudged: tuple[UnjudgedWalls, ...]
+    unjudged: tuple[WallsWithoutVerdict, ...]
     notes: tuple[str, ...]
     digest: str
 

@@ -23,7 +23,7 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.places import chief_threats, other_places, requested_threats
 from blast_env.evaluation.questions.grid_error import Effect, GridError, impulse_of
-from blast_env.evaluation.questions.limits import Limit, LimitedLoad, SiteVerdict, check_limits
+from blast_env.evaluation.questions.limits import Limit, LoadLimit, SiteVerdict, check_limits
 from blast_env.evaluation.questions.probability import Uncertainty
 from blast_env.evaluation.questions.reduction import ThreatOutcome
 from blast_env.evaluation.questions.verdict import Consequences, consequences_by_layout
@@ -399,12 +399,12 @@ class Study:
         )
         return without, behind
 
-    def _limited(self, records: Sequence[BlastRecord]) -> Iterator[LimitedLoad]:
+    def _limited(self, records: Sequence[BlastRecord]) -> Iterator[LoadLimit]:
         for limit in self.options.limits:
             for threat, record in zip(self.threats, records, strict=True):
                 load = record.complete.buildings.get(limit.building)
                 if load is not None:
-                    yield LimitedLoad(limit, threat.name, load)
+                    yield LoadLimit(limit, threat.name, load)
 
     def notes_of(self, blasts: Blasts) -> tuple[str, ...]:
         """Return reasons to distrust the loads of the threats on cells of one size."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece
-from blast_env.site.catalogue import Catalogue, PlacedModule, cell_text, element_text
+from blast_env.site.catalogue import Catalogue, ModulePlace, cell_text, element_text
 from blast_env.site.files import AnyScenario, find_scenario
 from blast_env.site.models import Scenario
 from blast_env.site.obstacles import obstacles_of
@@ -267,7 +267,7 @@ class LayoutState:
         return self._empty_zone.catalogue
 
     @property
-    def modules(self) -> tuple[PlacedModule, ...]:
+    def modules(self) -> tuple[ModulePlace, ...]:
         """The modules with their heights, piece by piece."""
         return self._zone.modules(self.layout)
 

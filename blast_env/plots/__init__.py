@@ -7,7 +7,7 @@ from blast_env.lazy import on_first_use
 if TYPE_CHECKING:
     from blast_env.plots.calibration_figures import calibration_figure
     from blast_env.plots.canvas import Frame
-    from blast_env.plots.cost_level import PricedDamage, cheapest
+    from blast_env.plots.cost_level import DamagePrice, cheapest
     from blast_env.plots.evaluation_figures import evaluation_figure
     from blast_env.plots.facade import LEVEL_COLOURS, facade_picture
     from blast_env.plots.figures import impulse_over_time, save_figure
@@ -67,6 +67,7 @@ __all__ = [
     "PROTECTED",
     "SITE_KINDS",
     "STRUCTURE",
+    "DamagePrice",
     "Feature",
     "FeatureKind",
     "FilmPlan",
@@ -79,7 +80,6 @@ __all__ = [
     "PlacingPainter",
     "PressurePainter",
     "PressureShot",
-    "PricedDamage",
     "VerticalSection",
     "Window",
     "area_feature",

@@ -21,7 +21,7 @@ _MOST_DAMAGE: Final = 5.0
 _MARGIN: Final = 0.05
 
 
-class PricedDamage(NamedTuple):
+class DamagePrice(NamedTuple):
     """A layout as a point: its cost, and the worst damage of all components behind it.
 
     Attributes:
@@ -33,9 +33,9 @@ class PricedDamage(NamedTuple):
     damage: float
 
 
-def cheapest(points: Iterable[PricedDamage]) -> list[PricedDamage]:
+def cheapest(points: Iterable[DamagePrice]) -> list[DamagePrice]:
     """Return the Pareto front of cost and damage, the cheapest point first."""
-    front: list[PricedDamage] = []
+    front: list[DamagePrice] = []
     for point in sorted(points):
         if not front or point.damage < front[-1].damage:
             front.append(point)
@@ -43,8 +43,8 @@ def cheapest(points: Iterable[PricedDamage]) -> list[PricedDamage]:
 
 
 def cost_level_figure(
-    tried: Mapping[str, Sequence[PricedDamage]],
-    judged: Sequence[tuple[PricedDamage, PricedDamage]],
+    tried: Mapping[str, Sequence[DamagePrice]],
+    judged: Sequence[tuple[DamagePrice, DamagePrice]],
     target: LevelOfProtection,
     title: str,
     words: tuple[str, str],
@@ -66,7 +66,7 @@ def cost_level_figure(
     most = max((point.cost for point in every), default=0.0) or 1.0
     _draw_levels(axes, target, most)
     front = cheapest(every)
-    ends = [*front, PricedDamage(most, front[-1].damage)]
+    ends = [*front, DamagePrice(most, front[-1].damage)]
     grey = unit_interval(QUIET_INK)
     handles = axes.step(
         *zip(*ends, strict=True), where="post", color=grey, label="least damage for the cost"

@@ -44,7 +44,7 @@ def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
 
 
 @dataclass(frozen=True)
-class PlacedLabel:
+class LabelPlacement:
     """A label and its position.
 
     Attributes:
@@ -68,7 +68,7 @@ def settled_labels(
     gap: float,
     far: float,
     others: Iterable[Rectangle] = (),
-) -> list[PlacedLabel]:
+) -> list[LabelPlacement]:
     """Place each label as near to its feature as occupied space allows.
 
     If there is no free position, a label takes the one that covers least.
@@ -92,7 +92,7 @@ def settled_labels(
         for feature in features
         if feature.kind.level >= Kinds.STRUCTURE.level or len(feature.places_m) == 1
     ]
-    taken, found = [*solid, *others], list[PlacedLabel]()
+    taken, found = [*solid, *others], list[LabelPlacement]()
     for label, size in zip(labels, sizes, strict=True):
         own, inside = box(label.feature), room(label.feature)
         free_of = [index for index in taken if index != own] + [item.place for item in found]
@@ -101,7 +101,7 @@ def settled_labels(
         if middle is not None and inside is not None and inside.contains(middle):
             tried.insert(0, (middle, free_of))
         place = best_place(tried, within)
-        found.append(PlacedLabel(label, place, _leader(own, place, far)))
+        found.append(LabelPlacement(label, place, _leader(own, place, far)))
     return found
 
 

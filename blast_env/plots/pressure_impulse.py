@@ -11,7 +11,7 @@ from blast_env.plots.style import number_on_axis, render_extra
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.damage import damage_number, level_of, under_triangle
-from blast_env.response.facade import FacadeResponse, FilledBay
+from blast_env.response.facade import FacadeBay, FacadeResponse
 from blast_env.response.sdof import impulses
 from blast_env.units import PA_PER_KPA
 
@@ -77,7 +77,7 @@ def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: 
     return figure
 
 
-def _groups(rows: Sequence[Sequence[FilledBay]]) -> list[tuple[Component, Members]]:
+def _groups(rows: Sequence[Sequence[FacadeBay]]) -> list[tuple[Component, Members]]:
     """Return the components, each with its bays in each row, those with most bays first."""
     found: list[tuple[Component, Members]] = []
     for row, bays in enumerate(rows):

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     )
     from blast_env.response.facade import (
         Bay,
+        FacadeBay,
         FacadeResponse,
-        FilledBay,
         assumption_words,
         divide,
         force_words,
@@ -68,8 +68,8 @@ __all__ = [
     "Bay",
     "BuildingDamage",
     "DamageLevel",
+    "FacadeBay",
     "FacadeResponse",
-    "FilledBay",
     "GlassKind",
     "Glazing",
     "GlazingCondition",

@@ -21,7 +21,7 @@ from pydantic import (
 )
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.response.glass import GlassKind, Interlayer, Pane
 from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheeting, Supports
 from blast_env.values import plain_text
@@ -49,8 +49,8 @@ class _Component(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    title: Annotated[_Text, Hashed.NEVER]
-    source: Annotated[_Text, Hashed.NEVER]
+    title: Annotated[_Text, HashMark.NEVER]
+    source: Annotated[_Text, HashMark.NEVER]
     cost_m2: Annotated[StrictFloat, Field(ge=0.0, le=1e9)] | None = None
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import FacadeResponse, FilledBay, peak_corrected, respond
+from blast_env.response.facade import FacadeBay, FacadeResponse, peak_corrected, respond
 from blast_env.response.glass import GlazingResponses, Pane, glazing_responses
 from blast_env.response.walls import Panel, PanelResponses, panel_responses
 
@@ -32,8 +32,8 @@ class Alternatives:
 
     name: str
     structure: str
-    glazing: Mapping[str, FilledBay]
-    wall: Mapping[str, FilledBay]
+    glazing: Mapping[str, FacadeBay]
+    wall: Mapping[str, FacadeBay]
 
 
 @dataclass(frozen=True)

@@ -209,7 +209,7 @@ def _stretches(
 
 
 @dataclass(frozen=True)
-class FilledBay:
+class FacadeBay:
     """A bay with its components.
 
     Attributes:
@@ -267,7 +267,7 @@ class FacadeResponse:
         walls: Responses of the panels.
     """
 
-    bays: tuple[FilledBay, ...]
+    bays: tuple[FacadeBay, ...]
     time_s: FloatArray
     pressure_pa: FloatArray
     glazed: FloatArray
@@ -458,7 +458,7 @@ def cells_of(peak_factor: float) -> float:
     return _CELLS_OF_HALF_A_PEAK / (peak_factor - 1.0) if peak_factor > 1.0 else inf
 
 
-def slowest_period_s(bays: Sequence[FilledBay]) -> float:
+def slowest_period_s(bays: Sequence[FacadeBay]) -> float:
     """Return the longest natural period of the components of bays, s; 0 without components."""
     panes = (_pane(bay.glazing).system for bay in bays if bay.glazing is not None)
     panels = (_panel(bay.wall, bay.bay.height_m).system for bay in bays if bay.wall is not None)
@@ -517,7 +517,7 @@ def rescaled(
 
 
 def respond(
-    bays: Sequence[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
+    bays: Sequence[FacadeBay], time_s: FloatArray, pressure_pa: FloatArray
 ) -> FacadeResponse:
     """Return the response of bays to their histories; no blast is run.
 
@@ -592,7 +592,7 @@ class LoadDraws:
 
 
 def drawn_levels(
-    filled: FilledBay,
+    filled: FacadeBay,
     is_window: bool,
     time_s: FloatArray,
     pressure_pa: FloatArray,
@@ -626,12 +626,12 @@ def pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     return np.where(counts, np.maximum(pressure_pa, 0.0), 0.0)
 
 
-def _panes(bays: Sequence[FilledBay]) -> list[Pane]:
+def _panes(bays: Sequence[FacadeBay]) -> list[Pane]:
     """Return a pane of each bay with windows; equal panes share one object and its costly curve."""
     return [_pane(bay.glazing) for bay in bays if bay.glazing is not None]
 
 
-def _panels(bays: Sequence[FilledBay]) -> list[Panel]:
+def _panels(bays: Sequence[FacadeBay]) -> list[Panel]:
     """Return the panel of each bay with a wall; equal panels share one object."""
     return [_panel(bay.wall, bay.bay.height_m) for bay in bays if bay.wall is not None]
 

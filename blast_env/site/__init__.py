@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         Catalogue,
         Hardening,
         Item,
-        PlacedModule,
+        ModulePlace,
         StockBarrier,
         stock_barriers,
     )
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
         with_overrides,
         with_resolution,
     )
-    from blast_env.site.presets import NamedMass, tnt_equivalent_kg
+    from blast_env.site.presets import MassPreset, tnt_equivalent_kg
     from blast_env.site.sections import (
         DrawingGeoreference,
         GaugeSection,
@@ -111,12 +111,12 @@ __all__ = [
     "KeepOut",
     "Layout",
     "MapGeoreference",
+    "MassPreset",
     "MeanRisk",
     "ModularObstacleSection",
-    "NamedMass",
+    "ModulePlace",
     "ObjectiveSection",
     "Piece",
-    "PlacedModule",
     "PointSource",
     "PolygonSection",
     "Problem",

@@ -19,7 +19,7 @@ from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError, unknown_name
 from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
@@ -58,16 +58,16 @@ class Barrier(SparseSection):
         {"mass_kg", "base_width_m", "friction", "anchorage_n", "crash_rating"}
     )
 
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, HashMark.NEVER] = ""
     length_modules: Count
     thickness_modules: Count = 1
     height_m: Height
     cost: Cost
     rotatable: StrictBool = True
     stops_vehicles: StrictBool = True
-    mass_kg: Annotated[Mass | None, Hashed.NEVER] = None
-    base_width_m: Annotated[BaseWidth | None, Hashed.NEVER] = None
-    anchorage_n: Annotated[Anchorage | None, Hashed.NEVER] = None
+    mass_kg: Annotated[Mass | None, HashMark.NEVER] = None
+    base_width_m: Annotated[BaseWidth | None, HashMark.NEVER] = None
+    anchorage_n: Annotated[Anchorage | None, HashMark.NEVER] = None
 
 
 class StockBarrier(Barrier):
@@ -112,8 +112,8 @@ class Item(Barrier):
 
     name: Name
     stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
-    friction: Annotated[Friction | None, Hashed.NEVER] = None
-    crash_rating: Annotated[CrashRating | None, Hashed.IF_SET] = None
+    friction: Annotated[Friction | None, HashMark.NEVER] = None
+    crash_rating: Annotated[CrashRating | None, HashMark.IF_SET] = None
     from_catalogue: Annotated[str | None, Field(exclude=True)] = None
 
     @model_validator(mode="before")
@@ -187,7 +187,7 @@ class Hardening(FacadePart):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, HashMark.NEVER] = ""
     structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)] | None = None
     cost: Cost
 
@@ -218,7 +218,7 @@ class Demolition(Section):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, Hashed.NEVER] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE, HashMark.NEVER] = ""
     structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
     cost: Cost
 
@@ -268,7 +268,7 @@ class Variant(NamedTuple):
                 yield row + up, column + right
 
 
-class PlacedModule(NamedTuple):
+class ModulePlace(NamedTuple):
     """One module of a layout.
 
     Attributes:

@@ -27,7 +27,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.problems import Problem, unknown_name
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
-from blast_env.response.facade import Bay, FilledBay, bays_in, divide
+from blast_env.response.facade import Bay, FacadeBay, bays_in, divide
 from blast_env.site.catalogue import Hardening
 from blast_env.site.structures import AnyStructure, FacadeSection
 
@@ -38,7 +38,7 @@ Components = Mapping[str, Glazing | Wall]
 
 
 @dataclass(frozen=True)
-class NamedBay:
+class BayComponents:
     """A bay with the names of its components.
 
     Attributes:
@@ -55,7 +55,7 @@ class NamedBay:
     wall: str | None
     pane_m: tuple[float | None, float | None] = (None, None)
 
-    def hardened(self, measures: Sequence[Hardening]) -> "NamedBay":
+    def hardened(self, measures: Sequence[Hardening]) -> "BayComponents":
         """Return it with measures taken; the last one for a component counts."""
         glazing, wall = self.glazing, self.wall
         for measure in measures:
@@ -64,7 +64,7 @@ class NamedBay:
                 wall = wall and (measure.wall or wall)
         return replace(self, glazing=glazing, wall=wall)
 
-    def filled(self, known: Components) -> FilledBay:
+    def filled(self, known: Components) -> FacadeBay:
         """Return it with its components.
 
         Raises:
@@ -82,7 +82,7 @@ class NamedBay:
         if window is not None and self.glazing != self.window:
             assert isinstance(glass, Glazing)
             window = with_glass(window, glass)
-        return FilledBay(self.bay, window, wall)
+        return FacadeBay(self.bay, window, wall)
 
     def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
         """Return its components, and those that measures would put there."""
@@ -123,7 +123,7 @@ def _bay_count(structure: AnyStructure) -> int:
     return bays_in(*plan, facade.storey_m, facade.bay_m, walls, facade.storeys)
 
 
-def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
+def named_bays(structure: AnyStructure) -> tuple[BayComponents, ...]:
     """Return the bays of a structure with the names of their components; none without a facade.
 
     Walls of a polygon that are shorter than half a bay have no windows.
@@ -152,7 +152,7 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
             glazing = None
         if glazing or wall or bay.line is None:
             pane_m = facade.pane_width_m, facade.pane_height_m
-            named.append(NamedBay(bay, glazing, glazing, wall, pane_m))
+            named.append(BayComponents(bay, glazing, glazing, wall, pane_m))
     return tuple(named)
 
 

@@ -18,16 +18,16 @@ from pydantic import (
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
-from blast_env.hashing import Hashed, digest_of, fields_with, hashed_content
+from blast_env.hashing import HashMark, digest_of, fields_with, hashed_content
 from blast_env.problems import Problem, ScenarioError, problems_from
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
-from blast_env.response.facade import FilledBay
+from blast_env.response.facade import FacadeBay
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems
 from blast_env.site.content import Content, Sources
-from blast_env.site.facade import NamedBay, named_bays
+from blast_env.site.facade import BayComponents, named_bays
 from blast_env.site.heights import default_air_height_m, height_notes
 from blast_env.site.sources import (
     AnyCharge,
@@ -65,15 +65,15 @@ class Scenario(Content):
     """
 
     @property
-    def bays(self) -> tuple[FilledBay, ...]:
+    def bays(self) -> tuple[FacadeBay, ...]:
         """The bays of all facades with their components."""
         return self.bays_with(())
 
-    def bays_with(self, layout: Iterable[Element]) -> tuple[FilledBay, ...]:
+    def bays_with(self, layout: Iterable[Element]) -> tuple[FacadeBay, ...]:
         """Return the bays of all facades with the measures of a layout taken."""
         return tuple(bay.filled(self._known) for bay in self.named_bays(layout))
 
-    def named_bays(self, layout: Iterable[Element] = ()) -> tuple[NamedBay, ...]:
+    def named_bays(self, layout: Iterable[Element] = ()) -> tuple[BayComponents, ...]:
         """Return the bays with the names of their components, with a layout's measures taken."""
         taken = {element.item for element in layout if isinstance(element, Measure)}
         measures = [hardening for hardening in self._hardening if hardening.name in taken]
@@ -147,7 +147,7 @@ class Scenario(Content):
         buildings, data for the stability of barriers, georeference, order of keys, or the form
         (preset or overrides) of the simulation parameters.
         """
-        left_out = () if self.objective.is_response else (Hashed.IF_RESPONSE,)
+        left_out = () if self.objective.is_response else (HashMark.IF_RESPONSE,)
         content = hashed_content(self, *left_out)
         content["schema_version"] = 1
         content["parameters"] = self.parameters.model_dump(mode="json")
@@ -166,11 +166,11 @@ class Scenario(Content):
         zone = self.build_zone
         built = [
             structure.model_dump(
-                mode="json", include=fields_with(type(structure), Hashed.OF_PLACES)
+                mode="json", include=fields_with(type(structure), HashMark.OF_PLACES)
             )
             for structure in self.structures
         ]
-        content = None if zone is None else hashed_content(zone, Hashed.NOT_OF_PLACES)
+        content = None if zone is None else hashed_content(zone, HashMark.NOT_OF_PLACES)
         return digest_of({"build_zone": content, "structures": built})
 
     @classmethod

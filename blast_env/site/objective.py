@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.arrays import FloatArray
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from
@@ -99,10 +99,10 @@ class ObjectiveSection(Section):
         cvar_level: With `"cvar"`, the worst share 1 - `cvar_level` counts; 0.8 unless given.
     """
 
-    kind: Annotated[Literal["load", "response"], Hashed.IF_SET] = "load"
-    measure: Annotated[Literal["damage", "glazing"], Hashed.IF_SET] = "damage"
-    target: Annotated[Literal["very low", "low", "medium", "high"] | None, Hashed.IF_SET] = None
-    target_probability: Annotated[Probability | None, Hashed.NEVER] = None
+    kind: Annotated[Literal["load", "response"], HashMark.IF_SET] = "load"
+    measure: Annotated[Literal["damage", "glazing"], HashMark.IF_SET] = "damage"
+    target: Annotated[Literal["very low", "low", "medium", "high"] | None, HashMark.IF_SET] = None
+    target_probability: Annotated[Probability | None, HashMark.NEVER] = None
     quantity: Literal["impulse", "peak", "both"] = "impulse"
     reference_impulse_pa_s: Reference | None = None
     reference_peak_pa: Reference | None = None

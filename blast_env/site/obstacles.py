@@ -7,7 +7,7 @@ from blast_env.site.catalogue import element_text
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import BuildZone
-from blast_env.vehicles.drive import Obstacles, RatedPiece
+from blast_env.vehicles.drive import CrashPiece, Obstacles
 
 
 def obstacles_of(
@@ -24,13 +24,13 @@ def obstacles_of(
     terraces = [structure for structure in structures if structure.carries]
     stops: list[Rectangle] = []
     solid: list[Rectangle] = []
-    rated: list[RatedPiece] = []
+    rated: list[CrashPiece] = []
     for element in sorted(standing(layout)):
         variant, rectangle = zone.catalogue.variant(element), zone.element_rectangle_m(element)
         if ground_below_m(terraces, rectangle) > 0.0:
             continue
         if variant.crash_rating is not None:
-            rated.append(RatedPiece(rectangle, variant.crash_rating, element_text(element)))
+            rated.append(CrashPiece(rectangle, variant.crash_rating, element_text(element)))
         else:
             (stops if variant.stops_vehicles else solid).append(rectangle)
     return Obstacles(tuple(stops), tuple(solid), tuple(rated))

@@ -57,7 +57,7 @@ def tnt_equivalent_kg(mass_kg: float, explosive: str) -> float:
 
 
 @dataclass(frozen=True)
-class NamedMass:
+class MassPreset:
     """A mass of TNT with a name.
 
     Attributes:
@@ -69,7 +69,7 @@ class NamedMass:
     tnt_kg: float
 
     @classmethod
-    def parsed(cls, text: str) -> "NamedMass":
+    def parsed(cls, text: str) -> "MassPreset":
         """Return the charge of a text: `car`, `truck=800`, `truck=800,anfo`.
 
         Raises:

@@ -11,7 +11,7 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.sections import (
     Coordinate,
     Ground,
@@ -36,10 +36,10 @@ class ChargeSource(Section):
         height_m: Height of the charge's centre above the ground; at 0 it lies on the ground.
     """
 
-    threat: Annotated[Name | None, Hashed.NEVER] = None
+    threat: Annotated[Name | None, HashMark.NEVER] = None
     tnt_kg: Annotated[StrictFloat, Field(ge=0.01, le=100_000.0)]
     weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
-    height_m: Annotated[Coordinate, Hashed.IF_SET] = 0.0
+    height_m: Annotated[Coordinate, HashMark.IF_SET] = 0.0
 
     @model_validator(mode="before")
     @classmethod

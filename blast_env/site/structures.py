@@ -13,7 +13,7 @@ from pydantic import (
 )
 
 from blast_env.geometry import Cell, Rectangle, WallName
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.problems import (
     Problem,
     ScenarioError,
@@ -80,11 +80,11 @@ class FacadeSection(Section):
     """
 
     storey_m: Annotated[StrictFloat, Field(ge=2.0, le=20.0)] = STOREY_M
-    storeys: Annotated[Annotated[StrictInt, Field(ge=1, le=200)] | None, Hashed.IF_SET] = None
+    storeys: Annotated[Annotated[StrictInt, Field(ge=1, le=200)] | None, HashMark.IF_SET] = None
     bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
     glazing: Name | None = None
-    pane_width_m: Annotated[PaneSide | None, Hashed.IF_SET] = None
-    pane_height_m: Annotated[PaneSide | None, Hashed.IF_SET] = None
+    pane_width_m: Annotated[PaneSide | None, HashMark.IF_SET] = None
+    pane_height_m: Annotated[PaneSide | None, HashMark.IF_SET] = None
     wall: Name | None = None
     parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
 
@@ -144,25 +144,25 @@ class StructureSection(Section):
         facade: The components of its walls; no load depends on it.
     """
 
-    name: Annotated[Name, Hashed.OF_PLACES]
+    name: Annotated[Name, HashMark.OF_PLACES]
     protected: StrictBool = False
     weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
-    peak_weight: Annotated[Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None, Hashed.IF_SET] = (
-        None
-    )
+    peak_weight: Annotated[
+        Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None, HashMark.IF_SET
+    ] = None
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-    height_m: Annotated[Height | None, Hashed.IF_SET, Hashed.OF_PLACES] = None
-    base_m: Annotated[Coordinate, Hashed.IF_SET, Hashed.OF_PLACES] = 0.0
-    carries: Annotated[StrictBool, Hashed.IF_SET, Hashed.OF_PLACES] = False
+    height_m: Annotated[Height | None, HashMark.IF_SET, HashMark.OF_PLACES] = None
+    base_m: Annotated[Coordinate, HashMark.IF_SET, HashMark.OF_PLACES] = 0.0
+    carries: Annotated[StrictBool, HashMark.IF_SET, HashMark.OF_PLACES] = False
     faces: Annotated[
         tuple[WallName, ...],
         Field(min_length=1, max_length=len(WALLS)),
         AfterValidator(_check_faces),
-        Hashed.IF_SET,
+        HashMark.IF_SET,
     ] = WALLS
-    building: Annotated[Name | None, Hashed.NEVER] = None
-    title: Annotated[str, Field(max_length=100), FOR_PEOPLE, Hashed.NEVER] = ""
-    facade: Annotated[FacadeSection | None, Hashed.IF_SET, Hashed.IF_RESPONSE] = None
+    building: Annotated[Name | None, HashMark.NEVER] = None
+    title: Annotated[str, Field(max_length=100), FOR_PEOPLE, HashMark.NEVER] = ""
+    facade: Annotated[FacadeSection | None, HashMark.IF_SET, HashMark.IF_RESPONSE] = None
 
     @property
     def lets_through(self) -> bool:
@@ -193,10 +193,10 @@ class StructureSection(Section):
 class ModularObstacleSection(StructureSection):
     """A `ModularObstacle`: a rectangle of rows x columns modules."""
 
-    kind: Annotated[Literal["ModularObstacle"], Hashed.OF_PLACES]
-    corner_m: Annotated[PointM, Hashed.OF_PLACES]
-    rows: Annotated[Count, Hashed.OF_PLACES]
-    columns: Annotated[Count, Hashed.OF_PLACES]
+    kind: Annotated[Literal["ModularObstacle"], HashMark.OF_PLACES]
+    corner_m: Annotated[PointM, HashMark.OF_PLACES]
+    rows: Annotated[Count, HashMark.OF_PLACES]
+    columns: Annotated[Count, HashMark.OF_PLACES]
 
     @property
     def modules(self) -> int:
@@ -218,9 +218,9 @@ class ModularObstacleSection(StructureSection):
 class ConcreteSquareSection(StructureSection):
     """A `ConcreteSquare`: a square of modules."""
 
-    kind: Annotated[Literal["ConcreteSquare"], Hashed.OF_PLACES]
-    corner_m: Annotated[PointM, Hashed.OF_PLACES]
-    side_modules: Annotated[Count, Hashed.OF_PLACES]
+    kind: Annotated[Literal["ConcreteSquare"], HashMark.OF_PLACES]
+    corner_m: Annotated[PointM, HashMark.OF_PLACES]
+    side_modules: Annotated[Count, HashMark.OF_PLACES]
 
     @property
     def modules(self) -> int:
@@ -261,9 +261,9 @@ class PolygonSection(StructureSection):
         courtyards_m: Corners of each of its courtyards.
     """
 
-    kind: Annotated[Literal["polygon"], Hashed.OF_PLACES]
-    outline_m: Annotated[Corners, Hashed.OF_PLACES]
-    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100), Hashed.OF_PLACES] = ()
+    kind: Annotated[Literal["polygon"], HashMark.OF_PLACES]
+    outline_m: Annotated[Corners, HashMark.OF_PLACES]
+    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100), HashMark.OF_PLACES] = ()
 
     @model_validator(mode="after")
     def _check_rings(self) -> Self:

@@ -28,7 +28,7 @@ from blast_env.geometry import (
     overlapping,
     overlapping_any,
 )
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.response.barriers import RigidPiece
 from blast_env.sections import FOR_PEOPLE, Area, Height, PointM, Section, Site, SparseSection
 from blast_env.site.catalogue import (
@@ -39,7 +39,7 @@ from blast_env.site.catalogue import (
     Demolition,
     Hardening,
     Item,
-    PlacedModule,
+    ModulePlace,
     Variant,
 )
 from blast_env.site.sections import Count
@@ -105,21 +105,23 @@ class BuildZone(Section):
     corner_m: PointM
     rows: Count
     columns: Count
-    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
-    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
-    removable: Annotated[tuple[Demolition, ...], Field(max_length=MOST_ITEMS), Hashed.IF_SET] = ()
+    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS), HashMark.IF_SET] = ()
+    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS), HashMark.IF_SET] = ()
+    removable: Annotated[tuple[Demolition, ...], Field(max_length=MOST_ITEMS), HashMark.IF_SET] = ()
     stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-    clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0), Hashed.IF_SET] = 0.0
-    module_cost: Annotated[Cost, Hashed.IF_SET] = 1.0
-    cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100), Hashed.IF_SET] = ()
+    clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0), HashMark.IF_SET] = 0.0
+    module_cost: Annotated[Cost, HashMark.IF_SET] = 1.0
+    cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100), HashMark.IF_SET] = ()
     budget: Annotated[
-        Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None, Hashed.IF_SET, Hashed.NOT_OF_PLACES
+        Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None,
+        HashMark.IF_SET,
+        HashMark.NOT_OF_PLACES,
     ] = None
-    currency: Annotated[str, Field(max_length=20), FOR_PEOPLE, Hashed.NEVER] = ""
-    access_way: Annotated[AccessWay | None, Hashed.IF_SET] = None
-    height_m: Annotated[Height | None, Hashed.IF_SET] = None
+    currency: Annotated[str, Field(max_length=20), FOR_PEOPLE, HashMark.NEVER] = ""
+    access_way: Annotated[AccessWay | None, HashMark.IF_SET] = None
+    height_m: Annotated[Height | None, HashMark.IF_SET] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -168,7 +170,7 @@ class BuildZone(Section):
         """The names of the structures that a layout can remove."""
         return frozenset(name for removal in self.removable for name in removal.structures)
 
-    def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
+    def modules(self, layout: Iterable[Element]) -> tuple[ModulePlace, ...]:
         """Return the modules of a layout, piece by piece.
 
         Raises:
@@ -180,7 +182,7 @@ class BuildZone(Section):
             variant = catalogue.variant(element)
             name = self.piece_name(element) if isinstance(element, Piece) else ""
             modules += [
-                PlacedModule(cell, variant.height_m, name, variant.stops_vehicles)
+                ModulePlace(cell, variant.height_m, name, variant.stops_vehicles)
                 for cell in variant.cells_at(element[0], element[1])
             ]
         return tuple(modules)

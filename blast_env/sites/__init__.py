@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         large_ranges,
     )
     from blast_env.sites.module_sites import SiteRanges
-    from blast_env.sites.ranges import Draws, Ranges, SpacedObstacle, draw_place
+    from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
     from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
     from blast_env.sites.turning import turned
 else:
@@ -45,12 +45,12 @@ __all__ = [
     "Draws",
     "ItemSiteRanges",
     "Objection",
+    "ObstacleSpace",
     "Ranges",
     "SiteCriterion",
     "SiteMeasures",
     "SiteRanges",
     "SiteSource",
-    "SpacedObstacle",
     "Visibility",
     "VisibilityCriterion",
     "close_ranges",

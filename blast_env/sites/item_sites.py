@@ -12,16 +12,16 @@ from blast_env.sites.ranges import (
     MARGIN_M,
     Amounts,
     Counts,
-    DrawnParts,
     Draws,
     Gaps,
     Lengths,
     Numbers,
+    ObstacleSpace,
     Probability,
     Ranges,
     Shifts,
     Side,
-    SpacedObstacle,
+    SiteParts,
     Span,
     WholeSpan,
     ZoneSide,
@@ -182,7 +182,7 @@ class ItemSiteRanges(Ranges):
             raise ScenarioError("ItemSiteRanges", problems)
         return self
 
-    def drawn(self, draws: Draws) -> DrawnParts:
+    def drawn(self, draws: Draws) -> SiteParts:
         """Draw a site."""
         has_vehicle = draws.happens(self.vehicle_probability)
         plan = _draw_plan(draws, self)
@@ -202,7 +202,7 @@ class ItemSiteRanges(Ranges):
         front_m = plan.front_m - (0.0 if has_vehicle else _ROAD_M)
         what = {"vehicle": "a vehicle", "segment": "a car"}.get(charge["kind"], "parked cars")
         description = f"A generated site: {what}, at most {front_m:g} m from what is protected."
-        return DrawnParts(description, sections)
+        return SiteParts(description, sections)
 
 
 LARGE_SIDE_M: Final = 60.0
@@ -390,8 +390,8 @@ def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> lis
         size_m = (draws.length_m(ranges.shed_side_m), draws.length_m(ranges.shed_side_m))
         far_m = ranges.side_m - MARGIN_M
         area = Rectangle(2.0 * _ROAD_M, MARGIN_M, far_m, far_m)
-        others = [SpacedObstacle(building, _BETWEEN_M) for building in plan.buildings]
-        shed = draw_place(draws, area, size_m, [*others, SpacedObstacle(plan.zone, 0.0)])
+        others = [ObstacleSpace(building, _BETWEEN_M) for building in plan.buildings]
+        shed = draw_place(draws, area, size_m, [*others, ObstacleSpace(plan.zone, 0.0)])
         if shed is not None:
             structures.append(structure("shed", shed, height_m=STOREY_M))
     return structures
@@ -463,7 +463,7 @@ def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list
             places.append(("the path to the door must stay open", path))
     for _ in range(draws.count(ranges.trees)):
         side_m = draws.length_m(ranges.tree_side_m)
-        others = [SpacedObstacle(place, 0.0) for _, place in places]
+        others = [ObstacleSpace(place, 0.0) for _, place in places]
         tree = draw_place(draws, yard(zone, building), (side_m, side_m), others)
         if tree is not None:
             places.append(("tree", tree))

@@ -12,16 +12,16 @@ from blast_env.sites.ranges import (
     MARGIN_M,
     Amounts,
     Counts,
-    DrawnParts,
     Draws,
     Gaps,
     Lengths,
     Numbers,
+    ObstacleSpace,
     Probability,
     Ranges,
     Shifts,
     Side,
-    SpacedObstacle,
+    SiteParts,
     Span,
     ZoneSide,
     draw_path,
@@ -133,7 +133,7 @@ class SiteRanges(Ranges):
             raise ScenarioError("SiteRanges", problems)
         return self
 
-    def drawn(self, draws: Draws) -> DrawnParts:
+    def drawn(self, draws: Draws) -> SiteParts:
         """Draw a site."""
         plan = _draw_plan(draws, self)
         charge = source(plan.threat, draws.amount(self.tnt_kg, 0))
@@ -152,7 +152,7 @@ class SiteRanges(Ranges):
             f" {building.left - threat.right:g} m from a"
             f" {'road' if threat.left == threat.right else 'parking area'} along the {{side}} side."
         )
-        return DrawnParts(description, sections)
+        return SiteParts(description, sections)
 
 
 @dataclass(frozen=True)
@@ -220,9 +220,9 @@ def _draw_neighbour(draws: Draws, ranges: SiteRanges, plan: _Plan) -> Rectangle 
     size_m = (draws.length_m(ranges.neighbour_side_m), draws.length_m(ranges.neighbour_side_m))
     area = Rectangle(MARGIN_M, MARGIN_M, plan.building.right, ranges.side_m - MARGIN_M)
     others = (
-        SpacedObstacle(plan.building, NEIGHBOUR_DISTANCE_M),
-        SpacedObstacle(plan.threat, NEIGHBOUR_DISTANCE_M),
-        SpacedObstacle(plan.zone, 0.0),
+        ObstacleSpace(plan.building, NEIGHBOUR_DISTANCE_M),
+        ObstacleSpace(plan.threat, NEIGHBOUR_DISTANCE_M),
+        ObstacleSpace(plan.zone, 0.0),
     )
     return draw_place(draws, area, size_m, others)
 
@@ -272,7 +272,7 @@ def _draw_keep_outs(draws: Draws, ranges: SiteRanges, plan: _Plan) -> list[dict[
     trees = draws.count(ranges.trees)
     squares += [("tree", draws.length_m(ranges.tree_side_m)) for _ in range(trees)]
     for reason, side_m in squares:
-        others = [SpacedObstacle(place, 0.0) for _, place in places]
+        others = [ObstacleSpace(place, 0.0) for _, place in places]
         place = draw_place(draws, yard(plan.zone, plan.building), (side_m, side_m), others)
         if place is not None:
             places.append((reason, place))

@@ -68,7 +68,7 @@ MARGIN_M: Final = 1.0
 """Width of the free strip along the border of a site."""
 
 
-class DrawnParts(NamedTuple):
+class SiteParts(NamedTuple):
     """The drawn parts of a site.
 
     Attributes:
@@ -125,7 +125,7 @@ class Ranges(Section):
         """Number of rows and of columns of the build zone."""
         return round(self.zone_side_m / MODULE_SIDE_M)
 
-    def drawn(self, draws: "Draws") -> DrawnParts:
+    def drawn(self, draws: "Draws") -> SiteParts:
         """Draw a site."""
         raise NotImplementedError
 
@@ -177,7 +177,7 @@ def on_grid(value_m: float) -> float:
 _TOLERANCE_M = 1e-9
 
 
-class SpacedObstacle(NamedTuple):
+class ObstacleSpace(NamedTuple):
     """An obstacle with a least distance.
 
     Attributes:
@@ -190,7 +190,7 @@ class SpacedObstacle(NamedTuple):
 
 
 def draw_place(
-    draws: Draws, area: Rectangle, size_m: tuple[float, float], others: Sequence[SpacedObstacle]
+    draws: Draws, area: Rectangle, size_m: tuple[float, float], others: Sequence[ObstacleSpace]
 ) -> Rectangle | None:
     """Draw the place of a rectangle, uniformly over the allowed places on the 0.5 m grid.
 

@@ -15,7 +15,7 @@ from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.blast_site import OUTWARDS, Charge
-from blast_env.site.facade import NamedBay
+from blast_env.site.facade import BayComponents
 from blast_env.site.terraces import ground_below_m, is_open_below
 from blast_env.surrogate.pieces import Box, Memory
 from blast_env.surrogate.relations import RELATIONS, relations
@@ -223,7 +223,7 @@ class SurrogateSite:
             for each in self.protected
         }
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
-        self._named: dict[frozenset[Element], tuple[NamedBay, ...]] = {}
+        self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
 
     def approach(self, charge: Charge) -> Approach:
         """Return the layout-independent data of a charge and the protected structures."""

@@ -9,10 +9,10 @@ if TYPE_CHECKING:
     from blast_env.vehicles.crash_rating import CrashRating
     from blast_env.vehicles.drive import (
         NOTHING,
+        CrashPiece,
         Drive,
         Impact,
         Obstacles,
-        RatedPiece,
         VehicleGround,
     )
     from blast_env.vehicles.driving import KM_H_PER_M_S, STEP_M, SpeedField
@@ -27,13 +27,13 @@ __all__ = [
     "NOTHING",
     "STEP_M",
     "AccessWay",
+    "CrashPiece",
     "CrashRating",
     "Drive",
     "Entry",
     "Impact",
     "Motion",
     "Obstacles",
-    "RatedPiece",
     "Reach",
     "SlowArea",
     "SpeedField",

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, StrictFloat
 
 from blast_env.arrays import BoolArray, any_in_windows, counts_before
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.sections import Ground, Section, SparseSection
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.crash_rating import CrashRating
@@ -34,7 +34,7 @@ class Gate(Ground, SparseSection):
 
     sparse: ClassVar = frozenset({"crash_rating"})
 
-    crash_rating: Annotated[CrashRating | None, Hashed.IF_SET] = None
+    crash_rating: Annotated[CrashRating | None, HashMark.IF_SET] = None
 
 
 class AccessWay(Section):
@@ -52,7 +52,7 @@ class AccessWay(Section):
 
     width_m: Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), WholeModules]
     between: Literal["left_right", "bottom_top"]
-    gate: Annotated[Gate | None, Hashed.IF_SET] = None
+    gate: Annotated[Gate | None, HashMark.IF_SET] = None
 
     @property
     def width_cells(self) -> int:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.errors import value_text
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
 from blast_env.sections import FOR_PEOPLE, Section
 from blast_env.vehicles.vehicle import Speed, VehicleMass
@@ -79,8 +79,8 @@ class CrashRating(Section):
     mass_kg: VehicleMass
     speed_km_h: Speed
     penetration_m: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.0
-    measured_from: Annotated[Literal["front", "rear"], Hashed.NEVER] = "rear"
-    test: Annotated[str, Field(max_length=100), FOR_PEOPLE, Hashed.NEVER] = ""
+    measured_from: Annotated[Literal["front", "rear"], HashMark.NEVER] = "rear"
+    test: Annotated[str, Field(max_length=100), FOR_PEOPLE, HashMark.NEVER] = ""
 
     @model_validator(mode="before")
     @classmethod

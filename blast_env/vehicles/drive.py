@@ -38,7 +38,7 @@ MOST_PLACES: Final = 3_000_000
 """Most places of the charges of all vehicles: three vehicles on the largest site."""
 
 
-class RatedPiece(NamedTuple):
+class CrashPiece(NamedTuple):
     """A piece or gate that stops the vehicles covered by its crash rating.
 
     Attributes:
@@ -63,7 +63,7 @@ class Obstacles(NamedTuple):
 
     stops: tuple[Rectangle, ...] = ()
     solid: tuple[Rectangle, ...] = ()
-    rated: tuple[RatedPiece, ...] = ()
+    rated: tuple[CrashPiece, ...] = ()
 
 
 NOTHING: Final = Obstacles()
@@ -89,7 +89,7 @@ class VehicleGround:
     standing_m: tuple[Rectangle, ...] = ()
     walls: tuple[Wall, ...] = ()
     gates: tuple[Rectangle, ...] = ()
-    rated_gates: tuple[RatedPiece, ...] = ()
+    rated_gates: tuple[CrashPiece, ...] = ()
     charge_radius_m: float = MODULE_SIDE_M
 
     def __hash__(self) -> int:
@@ -178,7 +178,7 @@ class Impact(NamedTuple):
         holds: Whether it stops the vehicle.
     """
 
-    piece: RatedPiece
+    piece: CrashPiece
     speed_km_h: float
     holds: bool
 
@@ -196,8 +196,8 @@ class Drive:
 
     ground: VehicleGround
     reach: Reach
-    held: tuple[RatedPiece, ...]
-    broken: tuple[RatedPiece, ...]
+    held: tuple[CrashPiece, ...]
+    broken: tuple[CrashPiece, ...]
 
     @cached_property
     def speeds(self) -> SpeedField | None:
@@ -238,7 +238,7 @@ class Drive:
         if self.speeds is None:
             return (), ()
         way = self.speeds.way_to(self.worst.places_m[0])
-        met: dict[RatedPiece, None] = {}
+        met: dict[CrashPiece, None] = {}
         for x_m, y_m in _along(way):
             around = Rectangle(x_m, y_m, x_m, y_m).grown(self.reach.width_m / 2.0)
             met |= dict.fromkeys(
@@ -285,7 +285,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     """Compute the drive of a vehicle."""
     motion = ground.source.motion
     held = (*obstacles.rated, *ground.rated_gates)
-    broken: tuple[RatedPiece, ...] = ()
+    broken: tuple[CrashPiece, ...] = ()
     if motion is None:
         return Drive(ground, _reach(ground, obstacles, held, broken), held, broken)
     # 1. Too light a rating for the mass: the piece breaks at any speed.
@@ -303,7 +303,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     # only ever break, so it ends after at most as many rounds as there are pieces.
     while True:
         reach = _reach(ground, obstacles, held, broken)
-        weak: tuple[RatedPiece, ...] = ()
+        weak: tuple[CrashPiece, ...] = ()
         if slow:
             is_open = reach.near(*_places_shape(ground), STEP_M)
             # The speeds on the empty site bound those on this one from above: they clear most
@@ -317,8 +317,8 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
 
 
 def _too_slow(
-    pieces: Iterable[RatedPiece], speeds: SpeedField, among: BoolArray | None = None
-) -> tuple[RatedPiece, ...]:
+    pieces: Iterable[CrashPiece], speeds: SpeedField, among: BoolArray | None = None
+) -> tuple[CrashPiece, ...]:
     """Return the pieces with impact speeds above those of their crash ratings.
 
     Args:
@@ -346,8 +346,8 @@ def _along(way: Sequence[WayPoint]) -> Iterator[PointM]:
 def _reach(
     ground: VehicleGround,
     obstacles: Obstacles,
-    held: Iterable[RatedPiece],
-    broken: Iterable[RatedPiece],
+    held: Iterable[CrashPiece],
+    broken: Iterable[CrashPiece],
 ) -> Reach:
     source, site = ground.source, ground.site
     return ReachQuery(
@@ -379,8 +379,8 @@ _FEW_ARCS: Final = 6
 
 @lru_cache(maxsize=256)
 def _weak_on(
-    ground: VehicleGround, bits: bytes, pieces: tuple[RatedPiece, ...]
-) -> tuple[RatedPiece, ...]:
+    ground: VehicleGround, bits: bytes, pieces: tuple[CrashPiece, ...]
+) -> tuple[CrashPiece, ...]:
     """Return the pieces that break under a vehicle with the given open places.
 
     It is cached because many layouts have the same open places.

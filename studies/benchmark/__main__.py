@@ -17,8 +17,8 @@ from blast_env.benchmark import (
     JUDGE_CELL_M,
     BenchmarkProblem,
     Definition,
-    JudgedSubmission,
     ScoreReference,
+    SubmissionJudgement,
     make,
     shipped_standings,
 )
@@ -65,7 +65,7 @@ def references(
     """
     with user_errors():
         known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
-        submissions = {path: JudgedSubmission.load(path) for path in judged or ()}
+        submissions = {path: SubmissionJudgement.load(path) for path in judged or ()}
         published, began = published_blasts(DEFINITIONS), monotonic()
         store = with_published(cache, published)
         engine = find_engine(JUDGE, 0.5)

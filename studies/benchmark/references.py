@@ -13,10 +13,10 @@ from blast_env.benchmark import (
     DEFINITIONS,
     JUDGE_CELL_M,
     Definition,
-    JudgedSubmission,
-    KnownLayout,
+    ReferenceLayout,
     Run,
     ScoreReference,
+    SubmissionJudgement,
     make,
     stored_references,
 )
@@ -82,7 +82,7 @@ def known_layouts(definition: Definition, published: BlastStore) -> dict[str, La
 
 def with_judged(
     known: Mapping[str, ScoreReference],
-    judged: Iterable[JudgedSubmission],
+    judged: Iterable[SubmissionJudgement],
     cache: BlastStore,
 ) -> dict[str, ScoreReference]:
     """Return references whose best known layout is the best by the judge's cells.
@@ -95,13 +95,13 @@ def with_judged(
         cache: Store of the blasts with cells of 0.5 m.
     """
     coarse, fine = cell_key(0.5), cell_key(JUDGE_CELL_M)
-    better: dict[str, list[KnownLayout]] = defaultdict(list)
+    better: dict[str, list[ReferenceLayout]] = defaultdict(list)
     for submission in judged:
         for run in submission.runs:
             best = known[run.problem].best
             if cell_key(submission.cell_m) == fine and run.share < best.shares[fine]:
                 method = f"{submission.method}, {run.budget:,} blasts, seed {run.seed}"
-                better[run.problem].append(KnownLayout(method, run.layout, {fine: run.share}))
+                better[run.problem].append(ReferenceLayout(method, run.layout, {fine: run.share}))
     found, engine = dict(known), find_engine(JUDGE, 0.5)
     for name, candidates in better.items():
         evaluator = BlastEvaluator(DEFINITIONS[name].scenario, engine, cache=cache)
@@ -114,7 +114,9 @@ def with_judged(
     return found
 
 
-def rescaled(judged: JudgedSubmission, known: Mapping[str, ScoreReference]) -> JudgedSubmission:
+def rescaled(
+    judged: SubmissionJudgement, known: Mapping[str, ScoreReference]
+) -> SubmissionJudgement:
     """Return a judged submission with the best known shares of new references."""
     key = cell_key(judged.cell_m)
     runs = (replace(run, best=known[run.problem].best.shares[key]) for run in judged.runs)
@@ -154,7 +156,7 @@ def with_fine_shares(
     least = min(known.rules.values())
     close = [name for name, share in known.rules.items() if share < least + _CLOSE]
     rules = [
-        KnownLayout(name, tuple(sorted(layouts[name])), {coarse: known.rules[name]})
+        ReferenceLayout(name, tuple(sorted(layouts[name])), {coarse: known.rules[name]})
         for name in close
     ]
     found = [*rules, known.best]

@@ -9,7 +9,7 @@ from typing import get_args
 import gymnasium as gym
 import pytest
 import yaml
-from blast_agents.training import TrainedAgent, load_archive
+from blast_agents.training import PolicyAgent, load_archive
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
     Hyperparameters,
@@ -111,7 +111,7 @@ def test_an_archive_of_rl_zoo_is_read_where_rl_zoo_is_missing(
     agent = load_archive(archive, "ppo", scenario, trust_archive=True)
     layout = agent.propose(scenario)
     assert layout
-    assert layout == TrainedAgent(model.policy, scenario).propose(scenario)
+    assert layout == PolicyAgent(model.policy, scenario).propose(scenario)
 
 
 def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:

@@ -10,7 +10,7 @@ import torch
 from blast_agents.training import Hyperparameters, load_agent, resume, train
 from blast_agents.training.agent import (
     Policy,
-    TrainedAgent,
+    PolicyAgent,
     as_tensor,
     fitted,
     logits_of,
@@ -46,14 +46,14 @@ def warm(**changes: Any) -> Hyperparameters:
     return hyperparameters({"imitation_updates": 4, "imitation_cases": 4, **changes})
 
 
-def agent_for(scenario: Scenario, observation: str = "grid") -> TrainedAgent:
+def agent_for(scenario: Scenario, observation: str = "grid") -> PolicyAgent:
     """Return an agent that has learnt nothing."""
     chosen = settings(Path("anywhere"), observation=observation)
     policy = {"policy": "MlpPolicy"} if observation == "features" else {}
     given = RunConfiguration(chosen, hyperparameters(policy), scenario.content_hash)
     configuration = fitted(given, scenario)
     torch.manual_seed(0)
-    return TrainedAgent(policy_for(configuration, scenario), scenario, observation)
+    return PolicyAgent(policy_for(configuration, scenario), scenario, observation)
 
 
 def first_cases(scenario: Scenario, count: int, **changes: Any) -> tuple[LoadCaseSet, ...]:
@@ -140,7 +140,7 @@ def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:
     assert bool(with_vehicle.vehicles) > bool(without.vehicles)
     (case,) = first_cases(without, 1)
     lesson = Demonstration(case, by_rule(case), 0.4, "grid", among_vehicles=True)
-    agent = TrainedAgent(agent_for(without).policy, with_vehicle)
+    agent = PolicyAgent(agent_for(without).policy, with_vehicle)
     seen = agent._episode(without, case.charge).observe(LayoutState.empty(without))
     assert lesson.draw(np.random.default_rng(0)).observation.shape == seen.shape
     alone = replace(lesson, among_vehicles=False).draw(np.random.default_rng(0))

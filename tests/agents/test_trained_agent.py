@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.policies.spatial import SpatialPolicy
-from blast_agents.training import TrainedAgent, load_agent, load_archive, resume, train
+from blast_agents.training import PolicyAgent, load_agent, load_archive, resume, train
 from blast_agents.training.agent import logits_of, policy_for
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_agents.training.weights import read_parameters
@@ -35,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def untrained(scenario: Scenario) -> TrainedAgent:
+def untrained(scenario: Scenario) -> PolicyAgent:
     zone = scenario.zone
     torch.manual_seed(0)
     chosen = hyperparameters().model_copy(
@@ -50,7 +50,7 @@ def untrained(scenario: Scenario) -> TrainedAgent:
         hyperparameters=chosen,
         scenario_hash=scenario.content_hash,
     )
-    return TrainedAgent(policy_for(configuration, scenario), scenario)
+    return PolicyAgent(policy_for(configuration, scenario), scenario)
 
 
 def test_proposals_are_legal_and_always_the_same(run: Path) -> None:

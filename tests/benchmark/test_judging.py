@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 from blast_env.benchmark import (
     DEFINITIONS,
     BenchmarkProblem,
-    JudgedSubmission,
-    KnownLayout,
+    ReferenceLayout,
     Run,
     ScoreReference,
     Submission,
+    SubmissionJudgement,
     judge,
     make,
     shipped_standings,
@@ -24,7 +24,7 @@ from blast_env.benchmark import (
     standings_tables,
     stored_references,
 )
-from blast_env.benchmark.judging import JudgedRun, read_submission
+from blast_env.benchmark.judging import RunJudgement, read_submission
 from blast_env.cli import app
 from blast_env.cli.judge import _Judging
 from blast_env.errors import BlastEnvError
@@ -40,12 +40,12 @@ def wall(row: int) -> tuple[Piece, ...]:
 
 REFERENCES = {
     NAME: ScoreReference(
-        "", "row 1", {}, KnownLayout("rule", wall(16)), KnownLayout("best", wall(12))
+        "", "row 1", {}, ReferenceLayout("rule", wall(16)), ReferenceLayout("best", wall(12))
     )
 }
 
 
-def judged(*runs: Run) -> JudgedSubmission:
+def judged(*runs: Run) -> SubmissionJudgement:
     return judge(Submission("own", runs), None, engine=RowEngine(), references=REFERENCES)
 
 
@@ -69,7 +69,7 @@ def test_the_interval_is_over_the_seeds() -> None:
 
 
 def test_a_layout_that_is_better_than_the_best_known_shows() -> None:
-    best = JudgedRun(NAME, 0, 0, 0, wall(12), 0.5, 0.7, 0.6)
+    best = RunJudgement(NAME, 0, 0, 0, wall(12), 0.5, 0.7, 0.6)
     assert best.score == pytest.approx(2.0)
     assert replace(best, best=0.7, share=0.7).score == 1.0
     assert replace(best, best=0.7, share=0.71).score == 0.0
@@ -96,11 +96,11 @@ def test_a_submission_of_no_use_is_refused(
 
 def test_what_was_judged_is_read_back_and_can_be_judged_again(tmp_path: Path) -> None:
     own = judged(run(13), run(14, 50))
-    assert JudgedSubmission.load(own.save(tmp_path / "own.json")) == own
+    assert SubmissionJudgement.load(own.save(tmp_path / "own.json")) == own
     assert judge(own.submission, None, engine=RowEngine(), references=REFERENCES) == own
     (tmp_path / "own.json").write_text('{"method": "own", "runs": []}')
     with pytest.raises(BlastEnvError, match=r"own\.json: "):
-        JudgedSubmission.load(tmp_path / "own.json")
+        SubmissionJudgement.load(tmp_path / "own.json")
 
 
 def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
@@ -162,10 +162,10 @@ def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> N
 def test_reductions_and_leads_are_over_the_problems() -> None:
     """Shares of 0.95 and 0.9 of two problems, whose best rules leave 0.98 and 0.95."""
     runs = (
-        JudgedRun(NAME, 0, 0, 0, wall(13), 0.95, 0.98, 0.9),
-        JudgedRun("other", 0, 0, 0, wall(12), 0.9, 0.95, 0.9),
+        RunJudgement(NAME, 0, 0, 0, wall(13), 0.95, 0.98, 0.9),
+        RunJudgement("other", 0, 0, 0, wall(12), 0.9, 0.95, 0.9),
     )
-    both = JudgedSubmission("own", 0.5, "row 1", runs)
+    both = SubmissionJudgement("own", 0.5, "row 1", runs)
     assert both.reduction(0).value == pytest.approx(0.075)
     assert both.lead(0).value == pytest.approx(0.04)
     assert both.lead(0).high - 0.04 == pytest.approx(12.706 * 0.01, rel=1e-4)
@@ -178,12 +178,12 @@ def test_reductions_and_leads_are_over_the_problems() -> None:
 def test_losses_rank_a_method_behind_one_that_never_loses() -> None:
     """The clipped score forgets them: 1 and -7 halves of the way are 0.5, twice a third 0.33."""
 
-    def of(method: str, *shares: float) -> JudgedSubmission:
+    def of(method: str, *shares: float) -> SubmissionJudgement:
         runs = (
-            JudgedRun(name, 0, 0, 0, wall(12), share, 0.8, 0.7)
+            RunJudgement(name, 0, 0, 0, wall(12), share, 0.8, 0.7)
             for name, share in zip((NAME, "other"), shares, strict=True)
         )
-        return JudgedSubmission(method, 0.5, "row 1", tuple(runs))
+        return SubmissionJudgement(method, 0.5, "row 1", tuple(runs))
 
     gambler, steady = of("gambler", 0.7, 1.0), of("steady", 0.77, 0.77)
     assert gambler.score(0).value > steady.score(0).value
@@ -194,12 +194,12 @@ def test_losses_rank_a_method_behind_one_that_never_loses() -> None:
 def test_leads_of_many_methods_are_corrected_for_their_number() -> None:
     """Holm: the least of three p values counts three times, the next twice, none below the last."""
 
-    def entry(method: str, *leads: float) -> JudgedSubmission:
+    def entry(method: str, *leads: float) -> SubmissionJudgement:
         runs = (
-            JudgedRun(f"problem {place}", 0, 0, 0, wall(12), 0.8 - lead, 0.8, 0.6)
+            RunJudgement(f"problem {place}", 0, 0, 0, wall(12), 0.8 - lead, 0.8, 0.6)
             for place, lead in enumerate(leads)
         )
-        return JudgedSubmission(method, 0.5, "row 1", tuple(runs))
+        return SubmissionJudgement(method, 0.5, "row 1", tuple(runs))
 
     entries = [
         entry("clear", 0.05, 0.06, 0.05, 0.07),
@@ -293,7 +293,11 @@ def test_shares_of_another_version_of_the_engine_are_judged_again() -> None:
     """Stored shares are of the load that the version had."""
     cells = {"": 0.123}
     stored = ScoreReference(
-        "", "row 1", {}, KnownLayout("rule", wall(16), cells), KnownLayout("best", wall(12), cells)
+        "",
+        "row 1",
+        {},
+        ReferenceLayout("rule", wall(16), cells),
+        ReferenceLayout("best", wall(12), cells),
     )
     runs = Submission("own", (run(14, 50),))
 

@@ -25,7 +25,7 @@ from blast_env.evaluation.questions.probability import LevelProbability
 from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import LayoutState, load_layout
-from blast_env.plots import PricedDamage, cheapest
+from blast_env.plots import DamagePrice, cheapest
 from blast_env.site import Charge
 from tests.evaluation.test_response_objective import THREAT
 from tests.site.test_hardening import glazed_yard
@@ -121,7 +121,7 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
     problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     found = advise(problem, MeasureKind.HARDEN, 5)
     assert [each.cost for each in found.tried] == [0.0, 5.0, 4.0, 9.0]
-    front = cheapest([PricedDamage(each.cost, each.damage) for each in found.tried])
+    front = cheapest([DamagePrice(each.cost, each.damage) for each in found.tried])
     assert [each.damage for each in front] == sorted((each.damage for each in front), reverse=True)
     assert front[0].cost == 0.0
     assert front[-1].damage == min(each.damage for each in found.tried)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from blast_agents.training.callbacks import HeldOutCallback
+from blast_agents.training.callbacks import ValidationCallback
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
@@ -260,10 +260,10 @@ def test_an_interrupted_training_says_how_to_go_on(
     """Before the first evaluation there are no weights to evaluate."""
     site, folder = scenario_file(tmp_path), tmp_path / "run"
 
-    def interrupt(self: HeldOutCallback) -> None:
+    def interrupt(self: ValidationCallback) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(HeldOutCallback, "_record", interrupt)
+    monkeypatch.setattr(ValidationCallback, "_record", interrupt)
     changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1", "evaluation_cases=2")
     options = [text for change in changes for text in ("--set", change)]
     result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)

@@ -5,20 +5,20 @@ from typing import Any
 
 from blast_agents.training import load_agent, train
 
-from blast_env.benchmark import JudgedSubmission, site_problems
+from blast_env.benchmark import SubmissionJudgement, site_problems
 from blast_env.layout import check_layout
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
 from tests.cli.running import run
 
 
-def judged_agent(folder: Path, site: Path, *given: Any, **changes: Any) -> JudgedSubmission:
+def judged_agent(folder: Path, site: Path, *given: Any, **changes: Any) -> SubmissionJudgement:
     """Train an agent and judge it by gas dynamics, without a search; return its runs."""
     train(settings(site, steps=16, **changes), hyperparameters(), folder / "run")
     options = ("--run", folder / "run", "--scenario", site, "--budget", 0, "--cell", 0.5)
     result = run("judge", *options, *given, "--out", folder / "out")
     assert result.exit_code == 0, result.output
     assert "best rule" in result.stdout
-    found = JudgedSubmission.load(folder / "out" / "judged_agent_run.json")
+    found = SubmissionJudgement.load(folder / "out" / "judged_agent_run.json")
     assert found.reduction(0).low <= found.reduction(0).value <= found.reduction(0).high
     return found
 

@@ -10,18 +10,18 @@ from typer.testing import CliRunner, Result
 import blast_env
 from blast_env import save_scenario
 from blast_env.app import offers
-from blast_env.benchmark import JudgedSubmission, make, play
+from blast_env.benchmark import SubmissionJudgement, make, play
 from blast_env.benchmark.methods import find_method
 from blast_env.cli import app
 from blast_env.design import random_layout
 from blast_env.design.search import (
     DesignProblem,
-    LearntSearch,
     ProposerKind,
     ProposerRow,
     Report,
     RuleProposer,
     SearchResult,
+    SurrogateSearch,
     by_rule,
     layouts_by_rule,
     registry,
@@ -102,7 +102,7 @@ def test_both_are_methods_of_the_benchmark(tmp_path: Path) -> None:
     few = ("--method", "rules", "--method", "one_after_another", "--budget", 2, "--cell", 0.5)
     run("judge", *few, "--scenario", tmp_path / "hut.toml", "--out", tmp_path / "out")
     rule, search = (
-        JudgedSubmission.load(tmp_path / "out" / f"judged_{name}.json").runs[0]
+        SubmissionJudgement.load(tmp_path / "out" / f"judged_{name}.json").runs[0]
         for name in ("corner", "one_after_another")
     )
     assert (rule.problem, rule.blasts, search.blasts) == ("hut-known-v2", 0, 2)
@@ -130,7 +130,7 @@ def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> 
 
 def test_a_proposal_says_how_far_it_has_come() -> None:
     shares: list[float] = []
-    LearntSearch(by_hand(), changes=24).at_once(YARD, None, shares.append)
+    SurrogateSearch(by_hand(), changes=24).at_once(YARD, None, shares.append)
     assert shares == sorted(shares)
     assert len(shares) >= 3
     assert 0.0 < shares[0] < shares[-1] <= 1.0
@@ -138,7 +138,7 @@ def test_a_proposal_says_how_far_it_has_come() -> None:
 
 def test_something_must_have_learnt() -> None:
     with pytest.raises(BlastEnvError, match="neither a surrogate nor an agent"):
-        LearntSearch()
+        SurrogateSearch()
 
 
 class Own:

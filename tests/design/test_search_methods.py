@@ -11,10 +11,10 @@ from blast_env.design.search import (
     DesignProblem,
     GeneticSearch,
     Layout,
-    LearntSearch,
     PopulationAnnealingSearch,
     ProposerKind,
     SearchResult,
+    SurrogateSearch,
     find_proposer,
     layouts_by_rule,
     proposers,
@@ -257,7 +257,7 @@ class OneLayoutAgent:
 
 def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: DesignProblem) -> None:
     agent = OneLayoutAgent(((0, 0), (1, 0)))
-    search = LearntSearch(agent=agent, digest="one")
+    search = SurrogateSearch(agent=agent, digest="one")
     result = search.propose(problem, 60, 0)
     rules = find_proposer("best_rule").propose(problem, 100, 0)
     bound = min(problem.load(agent.layout), problem.load(rules.layout))

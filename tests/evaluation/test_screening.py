@@ -8,7 +8,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
 from blast_env.response import (
     Bay,
-    FilledBay,
+    FacadeBay,
     Glazing,
     LevelOfProtection,
     Requirement,
@@ -18,7 +18,7 @@ from blast_env.response import (
     respond,
     under_triangle,
 )
-from blast_env.site import Charge, NamedMass, Scenario, tnt_equivalent_kg
+from blast_env.site import Charge, MassPreset, Scenario, tnt_equivalent_kg
 from tests import builders
 from tests.gas_sites import hut, site_document
 
@@ -133,7 +133,7 @@ def test_requirements_name_one_scale() -> None:
     assert Requirement.parsed("gsa 3a").level is LevelOfProtection.LOW
     assert Requirement.parsed("iso C").level is LevelOfProtection.MEDIUM
     assert not Requirement.parsed("very low").glass_only
-    bay = FilledBay(Bay("hut", "west", 1, 1, 0.0, 3.0, 0.0, 3.5), wall=catalogue()["brick_215"])  # type: ignore[arg-type]
+    bay = FacadeBay(Bay("hut", "west", 1, 1, 0.0, 3.0, 0.0, 3.5), wall=catalogue()["brick_215"])  # type: ignore[arg-type]
     pushed = respond([bay], np.array([0.0, 0.02]), np.array([[200e3, 0.0]]))
     kept = ("gsa 1", "peak 201", "impulse 2001")
     assert all(Requirement.parsed(name).kept_by(pushed) for name in kept)
@@ -145,18 +145,18 @@ def test_requirements_name_one_scale() -> None:
 
 
 def test_masses_by_name_and_by_explosive() -> None:
-    assert NamedMass.parsed("car").tnt_kg == 227.0
-    assert NamedMass.parsed("truck=100,anfo").tnt_kg == pytest.approx(82.0)
+    assert MassPreset.parsed("car").tnt_kg == 227.0
+    assert MassPreset.parsed("truck=100,anfo").tnt_kg == pytest.approx(82.0)
     assert tnt_equivalent_kg(1.0, "c4") == 1.37
     for wrong in ("cart", "truck=0", "truck=1,semtex", "=3"):
         with pytest.raises(BlastEnvError):
-            NamedMass.parsed(wrong)
+            MassPreset.parsed(wrong)
 
 
 def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     with pytest.raises(BlastEnvError, match="--glazing"):
         screen(hut())
-    found = screen(hut().with_facades(None, "brick_215"), (), [NamedMass("car", 227.0)])
+    found = screen(hut().with_facades(None, "brick_215"), (), [MassPreset("car", 227.0)])
     assert found.present == {"brick_215"}
     assert found.threats[0].name == "car"
     assert found.threats[0].words[2] == "-"

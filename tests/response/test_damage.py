@@ -8,7 +8,7 @@ from blast_env.response import (
     Bay,
     BuildingDamage,
     DamageLevel,
-    FilledBay,
+    FacadeBay,
     Glazing,
     LevelOfProtection,
     TriangularLoads,
@@ -29,11 +29,11 @@ PEAKS_PA = np.geomspace(1e3, 200e3, 40)
 DURATION_S = 0.012
 
 
-def filled(name: str) -> FilledBay:
+def filled(name: str) -> FacadeBay:
     component = catalogue()[name]
     if isinstance(component, Glazing):
-        return FilledBay(BAY, component)
-    return FilledBay(BAY, None, component)
+        return FacadeBay(BAY, component)
+    return FacadeBay(BAY, None, component)
 
 
 def alternatives(*names: str) -> Alternatives:

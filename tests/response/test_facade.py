@@ -9,7 +9,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.response import (
     Bay,
-    FilledBay,
+    FacadeBay,
     Glazing,
     GlazingCondition,
     Interlayer,
@@ -80,18 +80,18 @@ def wall(name: str) -> Wall:
 
 
 def test_as_many_panes_as_there_is_room_for() -> None:
-    assert FilledBay(bay(), glazing("window_annealed_6")).panes == 2
-    assert FilledBay(bay(), wall=wall("brick_215")).panes == 0
+    assert FacadeBay(bay(), glazing("window_annealed_6")).panes == 2
+    assert FacadeBay(bay(), wall=wall("brick_215")).panes == 0
 
 
 def test_a_pane_that_is_too_large_for_its_bay() -> None:
     with pytest.raises(BlastEnvError, match=r"office/west/1/1: a pane of 1.2 x 1.5 m .* must fit"):
-        FilledBay(bay(1.0), glazing("window_annealed_6"))
+        FacadeBay(bay(1.0), glazing("window_annealed_6"))
 
 
 def test_a_bay_with_nothing_in_it() -> None:
     with pytest.raises(BlastEnvError, match="neither windows nor a wall"):
-        FilledBay(bay())
+        FacadeBay(bay())
 
 
 @given(st.floats(1.0, 3.0), st.floats(0.002, 0.05))
@@ -107,8 +107,8 @@ def test_sharper_histories_keep_their_impulse(factor: float, lasts_s: float) -> 
 
 def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
     """It holds a block wall that would fall, and throws a light one outwards after a short push."""
-    bays = [FilledBay(bay(), wall=wall(name)) for name in ("block_190", "timber_frame")]
-    bays.append(FilledBay(bay(), glazing("window_tempered_6")))
+    bays = [FacadeBay(bay(), wall=wall(name)) for name in ("block_190", "timber_frame")]
+    bays.append(FacadeBay(bay(), glazing("window_tempered_6")))
     time_s = np.array([0.0, 0.01, 0.02, 0.06, 0.2])
     helped = {False: 0, True: 0}
     for peak_pa in np.geomspace(2e3, 4e4, 20).tolist():
@@ -128,7 +128,7 @@ def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
 
 def test_echoes_after_the_load_do_not_throw_a_pane_however_long_the_run_lasts() -> None:
     """Without suction, overpressures of 50 Pa for seconds would add up to a blast."""
-    bays = [FilledBay(bay(), glazing("window_laminated_12"))]
+    bays = [FacadeBay(bay(), glazing("window_laminated_12"))]
     time_s = np.array([0.0, 0.02, 0.04, 0.08, 0.1, 4.0])
     history = np.array([[3e4, 0.0, -8e3, 0.0, 50.0, 50.0]])
     short, long = (respond(bays, time_s[:end], history[:, :end]) for end in (4, 6))
@@ -140,9 +140,9 @@ def test_windows_and_walls_of_a_building_decide_together() -> None:
     end_s = 2.0 * 200.0 / 28e3  # some 50 kg at 40 m
     time_s, history = np.array([0.0, end_s]), np.array([28e3, 0.0])
     bays = [
-        FilledBay(bay(), glazing("window_annealed_6"), wall("concrete_200")),
-        FilledBay(bay(), glazing("window_laminated_12")),
-        FilledBay(bay(), wall=wall("concrete_200")),
+        FacadeBay(bay(), glazing("window_annealed_6"), wall("concrete_200")),
+        FacadeBay(bay(), glazing("window_laminated_12")),
+        FacadeBay(bay(), wall=wall("concrete_200")),
     ]
     found = respond(bays, time_s, np.tile(history, (3, 1)))
     assert found.panes == 4
@@ -160,7 +160,7 @@ def test_thin_interlayers_are_named_and_films_are_not() -> None:
     layer = Interlayer(thickness_mm=0.76)
     thin = glazing("window_laminated_6").model_copy(update={"interlayer": layer})
     film = glazing("window_film_6")
-    bays = [FilledBay(bay(), case) for case in (thin, film, glazing("window_laminated_12"))]
+    bays = [FacadeBay(bay(), case) for case in (thin, film, glazing("window_laminated_12"))]
     found = respond(bays, np.array([0.0, 0.01]), np.full((3, 2), 100.0))
     assert found.thin_interlayers == (0.76,)
     assert "pane edges" in force_words([found])
@@ -169,7 +169,7 @@ def test_thin_interlayers_are_named_and_films_are_not() -> None:
 
 
 def words_on(
-    target: LevelOfProtection, peak_pa: float, impulse_pa_s: float, *filled: FilledBay
+    target: LevelOfProtection, peak_pa: float, impulse_pa_s: float, *filled: FacadeBay
 ) -> str:
     history = np.tile([peak_pa, 0.0], (len(filled), 1))
     found = respond(filled, np.array([0.0, 2.0 * impulse_pa_s / peak_pa]), history)
@@ -177,9 +177,9 @@ def words_on(
 
 
 def test_a_level_that_rests_on_assumed_properties_names_them() -> None:
-    studs, concrete = (FilledBay(bay(), wall=wall(name)) for name in ("steel_stud", "concrete_200"))
+    studs, concrete = (FacadeBay(bay(), wall=wall(name)) for name in ("steel_stud", "concrete_200"))
     plain, laminated = (
-        FilledBay(bay(), glazing(name)) for name in ("window_annealed_6", "window_laminated_12")
+        FacadeBay(bay(), glazing(name)) for name in ("window_annealed_6", "window_laminated_12")
     )
     medium = LevelOfProtection.MEDIUM
     calm, hard = (2e3, 10.0), (28e3, 200.0)
@@ -191,12 +191,12 @@ def test_a_level_that_rests_on_assumed_properties_names_them() -> None:
     assert words_on(medium, *hard, studs) == studs_words  # it fails by the assumed limits
     assert words_on(medium, *hard, studs, plain) == ""  # the plain pane fails without any
     given = studs.wall.section.model_copy(update={"ductility": (0.5, 1.0, 2.0, 3.0)})  # type: ignore[union-attr]
-    own = FilledBay(bay(), wall=studs.wall.model_copy(update={"section": given}))  # type: ignore[union-attr]
+    own = FacadeBay(bay(), wall=studs.wall.model_copy(update={"section": given}))  # type: ignore[union-attr]
     assert words_on(medium, *calm, own) == ""
 
 
 def test_the_heavy_limit_of_concrete_counts_only_between_its_neighbours() -> None:
-    concrete = FilledBay(bay(), wall=wall("concrete_150"))
+    concrete = FacadeBay(bay(), wall=wall("concrete_150"))
     low = LevelOfProtection.LOW
     assert words_on(low, 28e3, 200.0, concrete) == ""  # within the limit of moderate damage
     assert words_on(low, 3e6, 6000.0, concrete) == ""  # beyond that of hazardous damage

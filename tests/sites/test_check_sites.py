@@ -5,13 +5,13 @@ import pytest
 
 from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
-from studies.check_sites import MeasuredSite, drawn_sites, measured
+from studies.check_sites import SiteMeasurement, drawn_sites, measured
 from tests.sites.cases import yard
 
 
-def result(reduction: list[float]) -> MeasuredSite:
+def result(reduction: list[float]) -> SiteMeasurement:
     shares = SiteMeasures(1.0, 0.8, 0.7, 0.4)
-    return MeasuredSite(True, shares, 1000.0, np.array(reduction), np.array(reduction))
+    return SiteMeasurement(True, shares, 1000.0, np.array(reduction), np.array(reduction))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle, box_distances_m
-from blast_env.sites import Draws, SpacedObstacle, draw_place
+from blast_env.sites import Draws, ObstacleSpace, draw_place
 
 AREA = Rectangle(1.0, 2.0, 9.0, 8.0)
 HALVES = st.integers(0, 20).map(lambda count: count / 2.0)
@@ -19,7 +19,7 @@ RECTANGLES = st.builds(
     SIDES,
 )
 OTHERS = st.lists(
-    st.builds(SpacedObstacle, RECTANGLES, st.sampled_from([0.0, 1.0, 2.0])), max_size=4
+    st.builds(ObstacleSpace, RECTANGLES, st.sampled_from([0.0, 1.0, 2.0])), max_size=4
 )
 
 
@@ -34,7 +34,7 @@ def gap_m(one: Rectangle, other: Rectangle) -> float:
 
 @given(st.integers(0, 1000), SIDES, SIDES, OTHERS)
 def test_a_place_lies_in_its_area_on_the_grid_and_apart(
-    seed: int, width_m: float, height_m: float, others: list[SpacedObstacle]
+    seed: int, width_m: float, height_m: float, others: list[ObstacleSpace]
 ) -> None:
     place = draw_place(draws(seed), AREA, (width_m, height_m), others)
     if place is None:
@@ -49,7 +49,7 @@ def test_a_place_lies_in_its_area_on_the_grid_and_apart(
 
 def test_the_only_place_is_found() -> None:
     # A gap of 1 m beside a block that fills the rest: it may be touched.
-    rest = SpacedObstacle(Rectangle(1.0, 2.0, 8.0, 8.0), 0.0)
+    rest = ObstacleSpace(Rectangle(1.0, 2.0, 8.0, 8.0), 0.0)
     assert draw_place(draws(0), AREA, (1.0, 6.0), [rest]) == Rectangle(8.0, 2.0, 9.0, 8.0)
 
 

@@ -8,9 +8,9 @@ from blast_env.benchmark import (
     DEFINITIONS,
     JUDGE_CELL_M,
     Definition,
-    JudgedRun,
-    JudgedSubmission,
     Run,
+    RunJudgement,
+    SubmissionJudgement,
     make,
     play,
     stored_references,
@@ -53,10 +53,10 @@ def test_a_best_known_layout_is_better_than_the_rule_on_the_cells_of_a_search_to
     name, known = "control_room-known-v2", stored_references()
     stored = known[name].best
 
-    def judged(layout: Layout, share: float) -> JudgedSubmission:
+    def judged(layout: Layout, share: float) -> SubmissionJudgement:
         ends = known[name].rule.shares["0.25"], stored.shares["0.25"]
-        return JudgedSubmission(
-            "mine", JUDGE_CELL_M, "gas", (JudgedRun(name, 50, 0, 50, layout, share, *ends),)
+        return SubmissionJudgement(
+            "mine", JUDGE_CELL_M, "gas", (RunJudgement(name, 50, 0, 50, layout, share, *ends),)
         )
 
     empty, better = judged((), 0.1), judged(stored.layout, 0.2)

@@ -20,8 +20,8 @@ from studies.demo import (
     NOTHING,
     RANDOM,
     AgentComparison,
-    CorrectedReward,
     DemoSettings,
+    RewardCorrection,
     demonstrate,
 )
 from tests.catalogue_sites import WALL, yard_document
@@ -71,7 +71,7 @@ def test_it_trains_compares_and_films(tmp_path: Path) -> None:
 
 
 def test_a_blast_corrects_the_guess_of_its_layout_and_less_those_of_others() -> None:
-    reward, other = CorrectedReward(site_of(SITE)), WALL[2:]
+    reward, other = RewardCorrection(site_of(SITE)), WALL[2:]
     assert reward.corrected(WALL, 0.6) == 0.6
     reward.learn(WALL, guessed=0.6, reduction=0.4)
     reward.learn((), guessed=0.1, reduction=0.1)

@@ -18,7 +18,13 @@ from typer.testing import CliRunner
 
 import studies.surrogate
 from blast_env.design import random_layout
-from blast_env.design.search import DesignProblem, Guesses, LearntSearch, improved, layouts_by_rule
+from blast_env.design.search import (
+    DesignProblem,
+    Guesses,
+    SurrogateSearch,
+    improved,
+    layouts_by_rule,
+)
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
@@ -55,7 +61,7 @@ from blast_env.surrogate import (
     site_of,
 )
 from studies.blast_table import COLUMNS
-from studies.surrogate import HeldOut, Recipe, verdict
+from studies.surrogate import Holdout, Recipe, verdict
 from tests.catalogue_sites import wide_yard
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
@@ -494,7 +500,7 @@ def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
 
 
 def test_without_a_blast_it_proposes_the_same_legal_layout_again() -> None:
-    agent = LearntSearch(by_hand(), changes=8)
+    agent = SurrogateSearch(by_hand(), changes=8)
     for charge in (None, Charge((1.5, 5.0), 5.0)):
         layout = agent.at_once(YARD, charge)
         assert layout == agent.at_once(YARD, charge)
@@ -519,14 +525,14 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
     charge: Charge | None,
 ) -> None:
     surrogate, drawing = by_hand(), Drawing()
-    proposed = LearntSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
+    proposed = SurrogateSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
     drawn = [tuple(sorted(layout)) for layout in drawing.sample(YARD, charge, 3)]
     met = case() if charge is None else LoadCaseSet(YARD, (LoadCase(charge, 0),))
     likes = Guesses.of(surrogate, met).loads([(), *drawn])
     if charge is not None:
         assert proposed == [(), *drawn][int(likes.argmin())]
     assert proposed in drawn  # a wall is better than none
-    assert LearntSearch(surrogate, drawing, ranked=1).at_once(YARD, charge) == drawn[0]
+    assert SurrogateSearch(surrogate, drawing, ranked=1).at_once(YARD, charge) == drawn[0]
 
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
@@ -536,7 +542,7 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
         tuple(sorted(layout)) for layout in layouts_by_rule(YARD, problem.known_charge).values()
     }
     budget = len(ruled) + 2
-    method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
+    method = SurrogateSearch(by_hand(), digest="digest", guesses=12, drawn=4)
     result = method.propose(problem, budget, 0)
     assert result.blasts <= budget
     assert result.load is not None
@@ -571,7 +577,7 @@ class WrongBy(DesignProblem):
 def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -> None:
     problem = WrongBy(BlastEvaluator(YARD, FAST), case(10))
     assert problem.known_charge is None
-    method = LearntSearch(by_hand(), digest="digest", guesses=30, drawn=4)
+    method = SurrogateSearch(by_hand(), digest="digest", guesses=30, drawn=4)
     result = method.propose(problem, 40, 0)
     assert result.blasts == sum(problem.met.values()) <= 40
     assert result.threats == 10  # the chosen one has met all
@@ -626,7 +632,7 @@ def test_held_out_predictions_set_the_intervals() -> None:
     off = np.where(samples.site % 40 == 0, 0.3, 0.1)
     logs = samples.impulse.target + off
     found = [Predictions(logs[fold], spread[fold]) for fold in held_out]
-    joined = HeldOut.of(samples, samples.impulse, held_out, found)
+    joined = Holdout.of(samples, samples.impulse, held_out, found)
     assert joined.check.spreads == pytest.approx(1.0)
     assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))
     assert (joined.inside == (off < 0.2)).all()
@@ -634,7 +640,7 @@ def test_held_out_predictions_set_the_intervals() -> None:
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:
     evaluator = BlastEvaluator(YARD, FAST)
-    agent, threat = LearntSearch(by_hand(), changes=2), draw_threats(YARD, [3])[0]
+    agent, threat = SurrogateSearch(by_hand(), changes=2), draw_threats(YARD, [3])[0]
     found = verdict(by_hand(), 2, evaluator, threat)
     unprotected = evaluator.loads((), threat).protected_impulse_pa_s
     proposed = evaluator.loads(agent.at_once(YARD, threat.charge), threat)

@@ -16,9 +16,9 @@ from blast_env.site import Scenario, ScenarioError, VehicleSource, loaded_walls
 from blast_env.vehicles import (
     KM_H_PER_M_S,
     STEP_M,
+    CrashPiece,
     CrashRating,
     Obstacles,
-    RatedPiece,
     SpeedField,
     VehicleGround,
 )
@@ -188,14 +188,14 @@ def test_what_gives_way_is_what_a_full_search_of_every_round_says(
     rectangles = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
     every = speeds_of(yard, Obstacles(rectangles))
     held = tuple(
-        RatedPiece(
+        CrashPiece(
             rectangle, CrashRating(mass_kg=7200.0, speed_km_h=km_h + over), f"piece {number}"
         )
         for number, (rectangle, over) in enumerate(zip(rectangles, over_km_h, strict=False))
         if (km_h := every.impact_km_h(rectangle)) is not None
     )
     drive = yard.drive(Obstacles(rated=held))
-    broken: tuple[RatedPiece, ...] = ()
+    broken: tuple[CrashPiece, ...] = ()
     while True:
         stops, solid = (tuple(case.rectangle for case in some) for some in (held, broken))
         speeds = speeds_of(yard, Obstacles(stops, solid))
@@ -238,7 +238,7 @@ def test_a_rated_piece_stops_what_is_no_heavier_and_no_faster(
     rating: CrashRating, run_up_m: float, holds: bool
 ) -> None:
     road = ground(90.0, 6.0, (2.0, 4.0), [(0, 2, 90, 4)])
-    piece = RatedPiece(Rectangle(run_up_m + 2.0, 2.0, run_up_m + 2.5, 4.0), rating, "block")
+    piece = CrashPiece(Rectangle(run_up_m + 2.0, 2.0, run_up_m + 2.5, 4.0), rating, "block")
     drive = road.drive(Obstacles(rated=(piece,)))
     assert (piece in drive.held) is holds
     assert bool(drive.reach.places_m[:, 0].max() > run_up_m + 2.0) is not holds
@@ -249,8 +249,8 @@ def test_a_rated_piece_stops_what_is_no_heavier_and_no_faster(
 def test_a_piece_in_front_slows_nothing_but_one_that_narrows_the_way_may_save_the_next() -> None:
     """A weak post is run over; a strong one that makes the lorry turn saves the weak one."""
     road = ground(60.0, 12.0, (0.0, 12.0), [], entry_speed_km_h=50.0)
-    weak = RatedPiece(Rectangle(40.0, 0.0, 40.5, 12.0), RATING, "fence")
-    over = RatedPiece(Rectangle(20.0, 0.0, 20.5, 12.0), RATING, "first fence")
+    weak = CrashPiece(Rectangle(40.0, 0.0, 40.5, 12.0), RATING, "fence")
+    over = CrashPiece(Rectangle(20.0, 0.0, 20.5, 12.0), RATING, "first fence")
     assert road.drive(Obstacles(rated=(weak, over))).broken
     walls = (Rectangle(30.0, 0.0, 30.5, 9.5), Rectangle(36.0, 2.5, 36.5, 12.0))
     assert road.drive(Obstacles(stops=walls, rated=(weak,))).held == (weak,)
@@ -259,7 +259,7 @@ def test_a_piece_in_front_slows_nothing_but_one_that_narrows_the_way_may_save_th
 def test_what_gives_way_opens_the_run_up_to_the_next() -> None:
     road = ground(90.0, 6.0, (2.0, 4.0), [(0, 2, 90, 4)], entry_speed_km_h=60.0)
     pieces = tuple(
-        RatedPiece(Rectangle(x, 2.0, x + 0.5, 4.0), CrashRating(mass_kg=7200.0, speed_km_h=v), n)
+        CrashPiece(Rectangle(x, 2.0, x + 0.5, 4.0), CrashRating(mass_kg=7200.0, speed_km_h=v), n)
         for x, v, n in ((20.0, 48.0, "first"), (50.0, 64.0, "second"), (80.0, 96.0, "third"))
     )
     obstacles = Obstacles(rated=pieces)
@@ -435,7 +435,7 @@ def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
     hut = gate_site().structures[0].model_copy(update={"corner_m": (56.0, 24.0)})
     site = VehicleGround(yard.source, yard.site, hut.boxes_m, loaded_walls([hut]))
     fences = tuple(
-        RatedPiece(
+        CrashPiece(
             Rectangle(x, 0.0, x + 0.5, 40.0), CrashRating(mass_kg=3500.0, speed_km_h=32.0), n
         )
         for x, n in ((15.0, "first"), (30.0, "second"), (45.0, "third"))

@@ -175,7 +175,7 @@ _SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_v
 
 
 @dataclass(frozen=True, eq=False)
-class TrainedAgent:
+class PolicyAgent:
     """Places modules one after the other by a policy; a `LayoutAgent`.
 
     Attributes:
@@ -308,7 +308,7 @@ def weights_of(run: str | Path, weights: Literal["best", "last"] = "best") -> Pa
     return folder.best_model if weights == "best" else checkpoints[-1]
 
 
-def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
+def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> PolicyAgent:
     """Return the agent of a run folder.
 
     The policy is rebuilt from the run's configuration, and only weights are read: no file of a run
@@ -335,7 +335,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     policy = policy_for(configuration, scenario)
     load_policy(policy, read_parameters(place), place)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, configuration.settings.observation)
+    return PolicyAgent(policy, scenario, configuration.settings.observation)
 
 
 def load_archive(
@@ -345,7 +345,7 @@ def load_archive(
     *,
     trust_archive: bool = False,
     observation: str = "grid",
-) -> TrainedAgent:
+) -> PolicyAgent:
     """Return the agent of an archive written by stable-baselines3 or RL Zoo.
 
     Such archives may contain pickled objects, which can execute arbitrary code when read, so
@@ -372,7 +372,7 @@ def load_archive(
     except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
-    agent = TrainedAgent(policy, find_scenario(scenario), observation)
+    agent = PolicyAgent(policy, find_scenario(scenario), observation)
     seen, actions = policy_spaces(observation, agent.representative)
     for name, found, wanted in (
         ("observation_space", policy.observation_space, seen),

@@ -5,7 +5,7 @@ from time import perf_counter
 
 from stable_baselines3.common.callbacks import BaseCallback
 
-from blast_agents.training.agent import TrainedAgent
+from blast_agents.training.agent import PolicyAgent
 from blast_agents.training.cases import Selection
 from blast_agents.training.environments import BatchVecEnv
 from blast_agents.training.evaluations import (
@@ -19,7 +19,7 @@ from blast_agents.training.weights import write_model
 from blast_env.site import Scenario
 
 
-class HeldOutCallback(BaseCallback):
+class ValidationCallback(BaseCallback):
     """Evaluates after every few updates, and writes evaluations, best weights and a checkpoint.
 
     The files are those of stable-baselines3's `EvalCallback` and `CheckpointCallback`. Unlike
@@ -100,7 +100,7 @@ class HeldOutCallback(BaseCallback):
         """Evaluate the weights, keep them if they are the best, and write a checkpoint."""
         policy = self.model.policy
         found = self.selection.evaluate(
-            TrainedAgent(policy, self.scenario, self.settings.observation)  # type: ignore[arg-type]
+            PolicyAgent(policy, self.scenario, self.settings.observation)  # type: ignore[arg-type]
         )
         row = EvaluationRow(
             self.num_timesteps,

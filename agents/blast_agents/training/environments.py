@@ -30,7 +30,7 @@ from blast_env.values import checked_seed, whole_number
 _Env = gym.Env[Array, np.int64]
 
 
-class _Masked(gym.Wrapper[Array, np.int64, Array, np.int64]):
+class _MaskWrapper(gym.Wrapper[Array, np.int64, Array, np.int64]):
     """A wrapper that forwards the mask of legal actions."""
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -55,7 +55,7 @@ class _Pool:
         return drawn
 
 
-class ThreatPool(_Masked):
+class ThreatPool(_MaskWrapper):
     """Draws the episodes, with their sites and charges, from a fixed set.
 
     The blasts without a barrier then recur and are cached, so that an episode costs half the

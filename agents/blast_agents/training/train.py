@@ -19,7 +19,7 @@ from blast_agents.training.agent import (
     torch_threads,
     weights_of,
 )
-from blast_agents.training.callbacks import HeldOutCallback
+from blast_agents.training.callbacks import ValidationCallback
 from blast_agents.training.cases import Selection
 from blast_agents.training.environments import make_environments
 from blast_agents.training.evaluations import EvaluationRow, learning_curve, read_evaluations
@@ -172,7 +172,7 @@ class _Run:
                 model.num_timesteps = steps
             else:
                 begins_trained, blasts = self._begin(model)
-            callback = HeldOutCallback(
+            callback = ValidationCallback(
                 folder,
                 self.configuration,
                 self.source.representative,

@@ -17,7 +17,7 @@ from blast_env.answers.report.summary import charge_words, grid_error_words
 from blast_env.evaluation.engines.peaks import PeakSource
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.grid_error import FACTOR, ORDER
-from blast_env.evaluation.questions.limits import LimitedLoad, SiteVerdict
+from blast_env.evaluation.questions.limits import LoadLimit, SiteVerdict
 from blast_env.evaluation.questions.verdict import Verdict, consequences_of, other_glazing
 from blast_env.evaluation.record import BuildingLoad
 from blast_env.evaluation.study import Study, gas_of
@@ -288,7 +288,7 @@ def _limits(study: Study) -> Iterator[AnyPart]:
     yield Table.of("Limits of loads", headers, rows, 2, 2)
 
 
-def _both(bare: SiteVerdict, behind: SiteVerdict) -> Iterator[tuple[LimitedLoad, LimitedLoad]]:
+def _both(bare: SiteVerdict, behind: SiteVerdict) -> Iterator[tuple[LoadLimit, LoadLimit]]:
     yield from zip(bare.limited, behind.limited, strict=True)
 
 

@@ -14,7 +14,7 @@ from blast_env.geometry import Layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
-from blast_env.site.presets import CHARGE_PRESETS, PRESETS_SOURCE, NamedMass
+from blast_env.site.presets import CHARGE_PRESETS, PRESETS_SOURCE, MassPreset
 
 _REQUIREMENTS: Final = (
     *("very low", "low", "medium", "high"),
@@ -71,7 +71,7 @@ class ScreeningView:
 
     async def _screen(self, state: object) -> None:
         session = self._session
-        masses = [NamedMass(name, CHARGE_PRESETS[name][0]) for name in self._masses.value]
+        masses = [MassPreset(name, CHARGE_PRESETS[name][0]) for name in self._masses.value]
         required = Requirement.parsed(self._required.value)
         answer: Document | None = None
         words = ""
@@ -92,7 +92,7 @@ class ScreeningView:
 
 
 def _answer(
-    scenario: Scenario, layout: Layout, masses: list[NamedMass], required: Requirement
+    scenario: Scenario, layout: Layout, masses: list[MassPreset], required: Requirement
 ) -> Document:
     # Here, because pictures take half a second to import.
     from blast_env.plots.figures import png_of

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         layouts_by_rule,
     )
     from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
-    from blast_env.design.search.learnt import Guesses, LearntSearch, improved, search_by
+    from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved, search_by
     from blast_env.design.search.methods import (
         BestRuleSearch,
         PopulationAnnealingSearch,
@@ -53,7 +53,6 @@ __all__ = [
     "Guesses",
     "Layout",
     "LayoutAgent",
-    "LearntSearch",
     "MeasureKind",
     "Moves",
     "Need",
@@ -72,6 +71,7 @@ __all__ = [
     "SearchEndedError",
     "SearchResult",
     "SearchSession",
+    "SurrogateSearch",
     "advise",
     "advise_until",
     "against_each",

@@ -56,7 +56,7 @@ class MeasureKind(StrEnum):
 
 
 @dataclass(frozen=True, order=True)
-class AssessedLayout:
+class LayoutTrial:
     """A layout that was assessed: a simulated barrier with some of the measures.
 
     Attributes:
@@ -86,9 +86,9 @@ class Advice:
     """
 
     kind: MeasureKind
-    best: AssessedLayout
+    best: LayoutTrial
     blasts: int
-    tried: tuple[AssessedLayout, ...] = ()
+    tried: tuple[LayoutTrial, ...] = ()
 
     @property
     def layout(self) -> Layout:
@@ -179,8 +179,8 @@ def advise(
         )
     scenario, rng = only(problem.scenario, kind), generator(seed)
     metered = replace(problem, budget=budget)
-    best: dict[Layout, AssessedLayout] = {}
-    tried: list[AssessedLayout] = []
+    best: dict[Layout, LayoutTrial] = {}
+    tried: list[LayoutTrial] = []
     moves = Moves(scenario)
 
     def drawn() -> Iterator[Layout]:
@@ -295,7 +295,7 @@ def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
 
 def _hardened(
     problem: DesignProblem, scenario: Scenario, barrier: Layout, damage_below: float
-) -> list[AssessedLayout]:
+) -> list[LayoutTrial]:
     """Return a barrier with each choice of measures that the rest of the zone's budget pays for.
 
     Only the barrier alone needs blasts.
@@ -308,7 +308,7 @@ def _hardened(
     placement = LayoutState(scenario, barrier)
     left = placement.budget_left
     prices = {measure.name: measure.cost for measure in scenario.zone.hardening}
-    found: list[AssessedLayout] = []
+    found: list[LayoutTrial] = []
     for count in counts:
         for taken in combinations(names, count):
             cost = sum(prices[name] for name in taken)
@@ -317,7 +317,7 @@ def _hardened(
                 worth, damage = problem.load(layout), _worst_damage(problem, layout)
                 if worth <= 1.0 and damage >= damage_below:
                     worth = 1.0 + damage - damage_below + _TOO_LITTLE
-                found.append(AssessedLayout(worth, placement.cost + cost, damage, layout))
+                found.append(LayoutTrial(worth, placement.cost + cost, damage, layout))
     return found
 
 

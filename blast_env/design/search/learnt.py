@@ -126,7 +126,7 @@ def improved(
 
 
 @dataclass(frozen=True)
-class LearntSearch(Search):
+class SurrogateSearch(Search):
     """A search guided by a surrogate of gas dynamics, a trained agent, or both.
 
     Without a blast (a budget of 0) it proposes
@@ -309,14 +309,14 @@ class LearntSearch(Search):
             try_best([moves.near_best(best, session.rng) for _ in range(self.drawn)])
 
 
-def packaged_search() -> LearntSearch:
+def packaged_search() -> SurrogateSearch:
     """Return the search by the bundled surrogate."""
     return search_by(packaged_surrogate())
 
 
-def search_by(surrogate: Surrogate) -> LearntSearch:
+def search_by(surrogate: Surrogate) -> SurrogateSearch:
     """Return the search by a surrogate."""
-    return LearntSearch(surrogate, digest=surrogate.digest)
+    return SurrogateSearch(surrogate, digest=surrogate.digest)
 
 
 def _given(agent: SamplingAgent | None) -> SamplingAgent:

@@ -22,10 +22,10 @@ from blast_env.geometry import Layout
 from blast_env.site import Scenario
 
 if TYPE_CHECKING:
-    from blast_env.design.search.learnt import LearntSearch
+    from blast_env.design.search.learnt import SurrogateSearch
 
 
-def _by_surrogate() -> "LearntSearch":
+def _by_surrogate() -> "SurrogateSearch":
     from blast_env.design.search.learnt import packaged_search  # half a second to import
 
     return packaged_search()

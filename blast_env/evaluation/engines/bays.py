@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas_validation import bay_validations
-from blast_env.evaluation.record import UnjudgedWalls
+from blast_env.evaluation.record import WallsWithoutVerdict
 from blast_env.evaluation.validation import VALIDATION_COLUMNS, Validation
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
-from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
+from blast_env.response.facade import Bay, FacadeBay, FacadeResponse, respond
 from blast_env.response.glass import GlazingCondition
 from blast_env.response.sdof import impulses
 from blast_env.site.blast_site import StructureOutline
@@ -69,11 +69,11 @@ class BayLoads:
         recorder: Their histories along the normals of the walls, one patch each.
     """
 
-    bays: tuple[FilledBay, ...]
+    bays: tuple[FacadeBay, ...]
     recorder: "PatchHistories"
 
     @classmethod
-    def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
+    def begin(cls, run: "GasRun", bays: Sequence[FacadeBay]) -> "BayLoads":
         """Return the loads of a run that has not begun, to be recorded by `GasRun.record`."""
         from blast_env.gas.probes import PatchHistories
 
@@ -154,9 +154,9 @@ def unjudged_walls(
     table: "FaceTable",
     outlines: Sequence[StructureOutline],
     buildings: Mapping[str, str],
-    bays: Sequence[FilledBay],
+    bays: Sequence[FacadeBay],
     area_m2: FloatArray,
-) -> tuple[UnjudgedWalls, ...]:
+) -> tuple[WallsWithoutVerdict, ...]:
     """Return the walls that no verdict covers, one item per building with a facade and any.
 
     `area_m2` is the area of each face along the normal of its wall (faces,).
@@ -174,7 +174,7 @@ def unjudged_walls(
         if without.any():
             names = tuple(structures[i] for i in np.unique(table.structure[without]).tolist())
             left_m2, of_m2 = float(area_m2[without].sum()), float(area_m2[own].sum())
-            found.append(UnjudgedWalls(building, left_m2, of_m2, names))
+            found.append(WallsWithoutVerdict(building, left_m2, of_m2, names))
     return tuple(found)
 
 
@@ -235,7 +235,7 @@ def bay_rows(
 
 
 def bay_patches(
-    table: "FaceTable", structures: Sequence[str], bays: Sequence[FilledBay]
+    table: "FaceTable", structures: Sequence[str], bays: Sequence[FacadeBay]
 ) -> NDArray[np.int64]:
     """Return the index of the bay of each cell face, -1 for none (faces,)."""
     patch = np.full(len(table.faces), -1)

@@ -30,7 +30,7 @@ from blast_env.evaluation.record import (
     BlastLoads,
     BlastRecord,
     StructureLoad,
-    UnjudgedWalls,
+    WallsWithoutVerdict,
 )
 from blast_env.evaluation.validation import (
     NOT_KNOWN,
@@ -415,7 +415,7 @@ class GasResult:
         return self.bay_loads.table(self.run)
 
     @cached_property
-    def unjudged(self) -> tuple[UnjudgedWalls, ...]:
+    def unjudged(self) -> tuple[WallsWithoutVerdict, ...]:
         """Counted walls in no bay, one item per building with a facade and such walls."""
         scenario, table = self.blast.scenario, self.run.table
         return unjudged_walls(

@@ -29,7 +29,7 @@ class PeakSource(StrEnum):
 
 
 @dataclass(frozen=True)
-class CountedPeak:
+class PeakWeight:
     """The peak on a building to compare with limits.
 
     Attributes:
@@ -41,7 +41,7 @@ class CountedPeak:
     source: PeakSource
 
 
-def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> CountedPeak:
+def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> PeakWeight:
     """Return the largest of the counted peaks on faces of cells, of `GasResult.on_walls`."""
     charge = site.charge
     points_m = faces[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
@@ -61,4 +61,4 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> Counted
     source = PeakSource.GAS if seen[which] else PeakSource.EXTRAPOLATED
     if bounded[which] and counted_pa[which] == curve_pa[which]:
         source = PeakSource.CURVE
-    return CountedPeak(float(counted_pa[which]), source)
+    return PeakWeight(float(counted_pa[which]), source)

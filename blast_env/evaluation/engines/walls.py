@@ -15,8 +15,8 @@ from blast_env.evaluation.record import (
     BlastLoads,
     BlastRecord,
     BuildingLoad,
-    UnjudgedWalls,
     WallLoad,
+    WallsWithoutVerdict,
 )
 from blast_env.evaluation.validation import NOT_KNOWN, Validation
 from blast_env.gas.probes import ARRIVAL_PA
@@ -128,7 +128,7 @@ class GasOutcome(Protocol):
         """One row per barrier piece."""
 
     @property
-    def unjudged(self) -> tuple[UnjudgedWalls, ...]:
+    def unjudged(self) -> tuple[WallsWithoutVerdict, ...]:
         """Counted walls in no bay."""
 
     @property

@@ -69,7 +69,7 @@ def check_limits(limits: Sequence[Limit], buildings: Sequence[str]) -> None:
             raise BlastEnvError(f"--limit appears twice for {limit.building!r}")
 
 
-class LimitedLoad(NamedTuple):
+class LoadLimit(NamedTuple):
     """A load with its limit.
 
     Attributes:
@@ -105,7 +105,7 @@ class SiteVerdict:
 
     found: Consequences
     target: LevelOfProtection
-    limited: tuple[LimitedLoad, ...] = ()
+    limited: tuple[LoadLimit, ...] = ()
 
     @property
     def is_asked(self) -> bool:

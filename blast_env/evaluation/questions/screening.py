@@ -28,8 +28,8 @@ from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import damage_number, level_of, triangle, under_triangle
 from blast_env.response.facade import (
     STOREY_M,
+    FacadeBay,
     FacadeResponse,
-    FilledBay,
     assumption_words,
     respond,
     response_words,
@@ -40,7 +40,7 @@ from blast_env.response.walls import Panel
 from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.blast_site import BlastSite, Charge
-from blast_env.site.presets import NamedMass
+from blast_env.site.presets import MassPreset
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 
@@ -70,7 +70,7 @@ class BayScreening:
         response: Response of its windows and wall panel.
     """
 
-    filled: FilledBay
+    filled: FacadeBay
     distance_m: float
     in_sight: bool
     peak_pa: float
@@ -199,7 +199,7 @@ class Screening:
 def screen(
     scenario: Scenario,
     layout: Sequence[Element] = (),
-    threats: Iterable[NamedMass] = (),
+    threats: Iterable[MassPreset] = (),
 ) -> Screening:
     """Return the response of a site's facades before any blast, and the stand-offs they need.
 
@@ -308,14 +308,14 @@ class _Facade:
         site: The site with a charge that does not count.
     """
 
-    bays: tuple[FilledBay, ...]
+    bays: tuple[FacadeBay, ...]
     middles_m: FloatArray
     outward: FloatArray
     site: BlastSite
 
     @classmethod
     def of(
-        cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FilledBay]
+        cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FacadeBay]
     ) -> "_Facade":
         """Return the bays that no structure covers."""
         rectangles_m = {structure.name: structure.rectangle_m for structure in scenario.structures}
@@ -362,7 +362,7 @@ def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
     return covered
 
 
-def _by_threat(scenario: Scenario, named: Sequence[NamedMass]) -> dict[str, tuple[AnySource, ...]]:
+def _by_threat(scenario: Scenario, named: Sequence[MassPreset]) -> dict[str, tuple[AnySource, ...]]:
     """Return the sources of each threat: all of the site's, or those of one mass and height."""
     if named:
         return {

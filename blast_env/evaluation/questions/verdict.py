@@ -34,7 +34,7 @@ from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, bay_rows
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.engines.gas_validation import BayPlaces, bay_places, bay_validations
 from blast_env.evaluation.questions.reduction import CHARGE_COLUMNS, charge_values
-from blast_env.evaluation.record import BlastRecord, UnjudgedWalls, WallLoad
+from blast_env.evaluation.record import BlastRecord, WallLoad, WallsWithoutVerdict
 from blast_env.evaluation.validation import Validation
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.geometry import Layout
@@ -254,7 +254,7 @@ class Consequences:
     neighbours: tuple[Neighbour, ...] = ()
     barriers: tuple[BarrierResponse, ...] = ()
     unchecked: tuple[tuple[str, str], ...] = ()
-    unjudged: tuple[UnjudgedWalls, ...] = ()
+    unjudged: tuple[WallsWithoutVerdict, ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":

@@ -379,7 +379,7 @@ class LoadUnit:
 
     factor: float = 1.0
     label: str = LOAD_LABEL
-    of_structures: Mapping[str, "CalibratedLoad"] = field(default_factory=dict)
+    of_structures: Mapping[str, "LoadCalibration"] = field(default_factory=dict)
 
     @property
     def is_calibrated(self) -> bool:
@@ -408,7 +408,7 @@ class LoadUnit:
         if main.impulse == 0.0:
             return cls()
         loads = {
-            structure.name: CalibratedLoad(structure.impulse, convert(structure))
+            structure.name: LoadCalibration(structure.impulse, convert(structure))
             for structure in structures
             if structure.impulse > 0.0
         }
@@ -437,7 +437,7 @@ class LoadUnit:
 
 
 @dataclass(frozen=True)
-class CalibratedLoad:
+class LoadCalibration:
     """The calibrated load on a structure.
 
     Attributes:
