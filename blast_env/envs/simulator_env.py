@@ -51,7 +51,7 @@ _LATEST_S: Final = 60.0
 
 
 class BlastInProgress(ABC):
-    """A blast in progress, of particles or of gas.
+    """A blast in progress, by particles or by gas dynamics.
 
     Attributes:
         blast: The blast.
@@ -132,7 +132,7 @@ class BlastInProgress(ABC):
 
 
 class ParticlesInProgress(BlastInProgress):
-    """A blast of particles in progress.
+    """A blast by particles in progress.
 
     Args:
         blast: The blast.
@@ -363,7 +363,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     | `module_impulses` | (modules,) | float64 | on each module so far | simulation units; N s |
     | `particle_counts` | (2,) | int64 | explosive balls and air balls on the site | |
     | `time_s` | (1,) | float64 | time since the detonation | s |
-    | `structure_impulses` | (structures,) | float64 | mean over the walls that count | Pa s |
+    | `structure_impulses` | (structures,) | float64 | mean over the assessed walls | Pa s |
     | `overpressure` | (rows, columns) | float32 | of the cells 1.5 m above the site | Pa |
     | `gauges` | (gauges,) | float64 | overpressure at the scenario's gauges | Pa |
 

@@ -142,7 +142,7 @@ class BlastLoads:
     Attributes:
         structures: One load per structure, in the order of the scene.
         module_impulse_n_s: Momentum on the walls of the structures' modules, N s, in the order
-            of the scene (modules,); empty of particles.
+            of the scene (modules,); empty for particles.
         bays: Damage of the bays of facades with each of their possible components; empty unless
             the objective is a response.
         module_impulse_sim: Sum of m |v| on each module, simulation units (modules,); empty without

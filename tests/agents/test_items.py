@@ -231,7 +231,7 @@ def test_individuals_and_their_children_are_layouts(name: str, seed: int) -> Non
 
 @pytest.fixture(scope="module")
 def problem() -> DesignProblem:
-    """The yard of particles, in which a blast takes milliseconds, with few places for pieces."""
+    """The yard for particles, in which a blast takes milliseconds, with few places for pieces."""
     scenario = yard(
         corner_m=(4.0, 4.5),
         rows=6,

@@ -82,7 +82,7 @@ def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
         assert engine in helps["engine"]
         for setting in find_engine(engine).options:
             if name != "simulate" and setting == "until":
-                continue  # elsewhere only the walls that count are waited for
+                continue  # elsewhere only the assessed walls are waited for
             assert helps[setting]
 
 

@@ -98,7 +98,7 @@ def test_the_parts_of_a_building_are_one_on_the_heat_map(blast: Blast) -> None:
     assert len(figure.axes) == 3  # the site, the building, the bar
 
 
-# --- Loads of particles in Pa s where a calibration gives them, on one scale for several blasts.
+# --- Loads by particles in Pa s where a calibration gives them, on one scale for several blasts.
 
 
 WALL = ((1, 0), (2, 0))

@@ -465,8 +465,8 @@ class Evaluation:
         """One row per module of the structures, in the scene's order.
 
         The columns are `module_id`, `structure`, `x_m`, `y_m`, the load on the module with the
-        barrier and without (of particles `impulse_sim`, the sum of m |v|; of gas `impulse_n_s`, the
-        momentum on its walls), and its `reduction`.
+        barrier and without (for particles `impulse_sim`, the sum of m |v|; for gas `impulse_n_s`,
+        the momentum on its walls), and its `reduction`.
         """
         from blast_env.particles.structure import obstacle_of
         from blast_env.particles.tables import module_table
