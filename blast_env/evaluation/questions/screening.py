@@ -180,6 +180,7 @@ class Screening:
     def needed_m(self, threat: str, requirement: Requirement) -> float:
         """Return the stand-off at which all components of the site keep a requirement."""
         found = next(part for part in self.threats if part.name == threat)
+        # The farthest of all: every component of the site, then limits of peak and impulse.
         own = [
             stand_off.distances_m[requirement.level]
             for stand_off in self.stand_offs[threat]
@@ -211,6 +212,9 @@ def screen(
         BlastEnvError: If no structure has a facade, or two threats have the same name.
     """
     named = [*threats]
+    # (1) The sources of each threat; (2) its places, of vehicles as far as the layout lets them;
+    # (3) what each place sees of each bay; (4) the response by the curves at every place, of which
+    # the worst one stands for the threat.
     sources = _by_threat(scenario, named)
     if len({part.name for part in named}) < len(named):
         raise BlastEnvError("threats: two have the same name, must differ")
@@ -282,6 +286,8 @@ class _Curves:
             found = under_triangle(part, *(float(load[index]) for load in loads))
             return level_of(damage_number(found)) >= level
 
+        # Damage falls with distance, so the first distance that keeps the level is found by
+        # bisection.
         low, high = -1, _DISTANCES  # fails at the first, keeps at the second
         while high - low > 1:
             middle = (low + high) // 2
