@@ -157,8 +157,8 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda good: replace(good, module_impulse_n_s=good.module_impulse_n_s[1:]),
-        lambda good: replace(good, module_impulse_n_s=good.module_impulse_n_s * np.nan),
+        lambda good: replace(good, module_impulse_sim=good.module_impulse_sim[1:]),
+        lambda good: replace(good, module_impulse_sim=good.module_impulse_sim * np.nan),
         lambda good: replace(good, structures=good.structures[:0]),
         lambda good: replace(
             good, structures=tuple(replace(each, name="x") for each in good.structures)

@@ -100,7 +100,7 @@ def test_an_evaluator_works_in_a_spawned_process_and_keeps_what_it_remembers() -
 def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:
     document = COURTYARD.model_dump() | {"calibration": None, "name": "bare"}
     with pytest.raises(CalibrationError, match="'bare' names no calibration: set calibration to"):
-        BlastEvaluator(Scenario.from_document(document, "bare"))
+        BlastEvaluator(Scenario.from_document(document, "bare"), "event")
     other = COURTYARD.with_simulation(overrides={"air": {"mass": 0.5}})
     with pytest.raises(CalibrationError, match="the simulation has others"):
         BlastEvaluator(other, "event")
