@@ -176,7 +176,7 @@ def _put_vectors(
         variants: See `FeaturesEpisode` (numbers, 2, variants + 1).
         shares: Shares of stock, budget and items (episodes, 3 + items).
         legal: 1 where each variant may be placed (episodes, variants, cells).
-        standing: Number of the variant on each cell (episodes, cells).
+        occupancy: Number of the variant on each cell (episodes, cells).
         has_items: Whether there is a catalogue.
         vectors: The vectors (episodes, features).
     """
@@ -191,7 +191,7 @@ def _put_vectors(
         at += _SITE
         stands, is_free = vector[at : at + cells], vector[at + cells : at + 2 * cells]
         for cell in range(cells):
-            stands[cell] = min(standing[episode, cell], 1)
+            stands[cell] = min(occupancy[episode, cell], 1)
             is_free[cell] = legal[episode, 0, cell]
         for kind in range(1, kinds):
             for cell in range(cells):
@@ -206,8 +206,8 @@ def _put_vectors(
             heights, stops = vector[at : at + cells], vector[at + cells : at + 2 * cells]
             of_variants = variants[own[episode]]
             for cell in range(cells):
-                heights[cell] = of_variants[0, standing[episode, cell]]
-                stops[cell] = of_variants[1, standing[episode, cell]]
+                heights[cell] = of_variants[0, occupancy[episode, cell]]
+                stops[cell] = of_variants[1, occupancy[episode, cell]]
             at += 2 * cells
             for kind in range(kinds):
                 places = vector[at : at + cells]

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.geometry import Element, Rectangle
-from blast_env.hashing import Hashed
+from blast_env.hashing import HashMark
 from blast_env.response.components import Component
 from blast_env.sections import FOR_PEOPLE, Name, Section, Site
 from blast_env.site.heights import default_air_height_m
@@ -17,7 +17,7 @@ from blast_env.site.sections import AnyGeoreference, GaugeSection, SimulationSec
 from blast_env.site.sources import AnySource, VehicleSource
 from blast_env.site.structures import AnyStructure, loaded_walls
 from blast_env.site.zone import BuildZone, Surroundings
-from blast_env.vehicles.drive import RatedPiece, VehicleGround
+from blast_env.vehicles.drive import CrashPiece, VehicleGround
 from blast_env.vehicles.worst_places import Wall
 
 SCHEMA_VERSION: Final = 2
@@ -47,25 +47,25 @@ _MOST_GROUNDS: Final = 64
 class Content(Section):
     """The sections of a scenario; see `Scenario`."""
 
-    schema_version: Annotated[StrictInt, AfterValidator(_check_version), Hashed.NEVER]
-    name: Annotated[Name, Hashed.NEVER]
-    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE, Hashed.NEVER] = ""
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version), HashMark.NEVER]
+    name: Annotated[Name, HashMark.NEVER]
+    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE, HashMark.NEVER] = ""
     import_notes: Annotated[
         tuple[Annotated[str, Field(max_length=MOST_NOTE), FOR_PEOPLE], ...],
         Field(max_length=MOST_NOTES),
-        Hashed.NEVER,
+        HashMark.NEVER,
     ] = ()
     site: Site
     charge: Sources
     structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
     build_zone: BuildZone | None = None
-    simulation: Annotated[SimulationSection, Hashed.NEVER] = SimulationSection()
+    simulation: Annotated[SimulationSection, HashMark.NEVER] = SimulationSection()
     calibration: Name | None = None
-    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100), Hashed.IF_SET] = ()
-    objective: Annotated[ObjectiveSection, Hashed.IF_SET] = ObjectiveSection()
-    georeference: Annotated[AnyGeoreference | None, Hashed.NEVER] = None
+    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100), HashMark.IF_SET] = ()
+    objective: Annotated[ObjectiveSection, HashMark.IF_SET] = ObjectiveSection()
+    georeference: Annotated[AnyGeoreference | None, HashMark.NEVER] = None
     components: Annotated[
-        dict[Name, Component], Field(max_length=100), Hashed.IF_SET, Hashed.IF_RESPONSE
+        dict[Name, Component], Field(max_length=100), HashMark.IF_SET, HashMark.IF_RESPONSE
     ] = Field(default_factory=dict)
 
     @property
@@ -124,13 +124,13 @@ class Content(Section):
     ) -> VehicleGround:
         way = None if self.build_zone is None else self.build_zone.access_way
         closed: tuple[Rectangle, ...] = ()
-        rated: tuple[RatedPiece, ...] = ()
+        rated: tuple[CrashPiece, ...] = ()
         if way is not None and way.gate is not None:
             where, rating = way.gate.rectangle_m, way.gate.crash_rating
             if rating is None:
                 closed = (where,)
             else:
-                rated = (RatedPiece(where, rating, "the gate"),)
+                rated = (CrashPiece(where, rating, "the gate"),)
         standing_m = tuple(box for s in structures if not s.lets_through for box in s.boxes_m)
         return VehicleGround(
             source,
