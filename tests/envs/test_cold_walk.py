@@ -8,7 +8,7 @@ from typing import Final
 import pytest
 
 MOST_FILES: Final = {"make": 84, "reset": 23, "step": 52}
-MOST_FUNCTIONS: Final = {"make": 572, "reset": 126, "step": 360}
+MOST_FUNCTIONS: Final = {"make": 572, "reset": 126, "step": 370}
 
 _WALK: Final = """
 import json, os, sys
