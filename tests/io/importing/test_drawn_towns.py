@@ -175,6 +175,19 @@ def round_one(town: Town, draw: Any, left: float, height: float) -> None:
 
 
 @maker
+def stretched(town: Town, draw: Any, left: float, height: float) -> None:
+    """A round tower in a block that is stretched along one axis."""
+    block = town.document.blocks.new(f"OVAL{town.lots}")
+    rise = town.unit * height
+    block.add_circle(town.scaled(5.0, 5.0), town.unit * 5.0, {"layer": "0", "thickness": rise})
+    turn = draw(st.sampled_from((0.0, 90.0)))
+    place = town.scaled(left + 10.0, 0.0, town.zero_m)
+    scales = {"xscale": 2.0, "rotation": turn, "layer": "BLD"}
+    town.space.add_blockref(block.name, place, dxfattribs=scales)
+    town.expect((157.08, 0.0, height))
+
+
+@maker
 def joined(town: Town, draw: Any, left: float, height: float) -> None:
     corners = [(*town.scaled(*place), 0.0) for place in rectangle(left, 0, 20, 10)]
     for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
