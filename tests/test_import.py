@@ -27,12 +27,19 @@ def test_the_package_imports_nothing_heavy() -> None:
     modules = modules_after("import blast_env")
     assert modules.isdisjoint(HEAVY)
     own = {name for name in modules if name.split(".")[0] == "blast_env"}
-    assert own == {"blast_env", "blast_env.bundled", "blast_env.envs", "blast_env.provenance"}
+    light = {"blast_env.bundled", "blast_env.envs", "blast_env.lazy", "blast_env.provenance"}
+    assert own == {"blast_env", *light}
 
 
 def test_engines_import_neither_pandas_nor_numba_before_a_blast() -> None:
     statement = "import blast_env\nblast_env.GasResult, blast_env.simulate"
     assert modules_after(statement).isdisjoint({"numba", "pandas", "pymunk", "scipy"})
+
+
+def test_guesses_need_no_torch() -> None:
+    modules = modules_after("import blast_env.surrogate as room; room.packaged_surrogate()")
+    assert "blast_env.surrogate.network" in modules
+    assert not {"torch", "pandas"} & modules
 
 
 @pytest.mark.parametrize("name", blast_env.__all__)

@@ -1,31 +1,38 @@
 """A surrogate of gas dynamics, which predicts the loads of a blast within a millisecond."""
 
-from blast_env.surrogate.correction import Correction, apart_m3, stacked
-from blast_env.surrogate.engine import SurrogateEngine
-from blast_env.surrogate.fitting import (
-    MEMBERS,
-    Predictions,
-    Samples,
-    errors,
-    fit,
-    folds,
-    load_errors,
-)
-from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor
-from blast_env.surrogate.network import (
-    SHAPES,
-    Check,
-    Fit,
-    Guess,
-    Member,
-    Networks,
-    Surrogate,
-    load_surrogate,
-    packaged_surrogate,
-)
-from blast_env.surrogate.relations import relations
-from blast_env.surrogate.walls import FEATURES, INPUTS, SurrogateSite, WallPoints, site_of
-from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
+from typing import TYPE_CHECKING
+
+from blast_env.lazy import on_first_use
+
+if TYPE_CHECKING:
+    from blast_env.surrogate.correction import Correction, apart_m3, stacked
+    from blast_env.surrogate.engine import SurrogateEngine
+    from blast_env.surrogate.fitting import (
+        MEMBERS,
+        Predictions,
+        Samples,
+        errors,
+        fit,
+        folds,
+        load_errors,
+    )
+    from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor
+    from blast_env.surrogate.network import (
+        SHAPES,
+        Check,
+        Fit,
+        Guess,
+        Member,
+        Networks,
+        Surrogate,
+        load_surrogate,
+        packaged_surrogate,
+    )
+    from blast_env.surrogate.relations import relations
+    from blast_env.surrogate.walls import FEATURES, INPUTS, SurrogateSite, WallPoints, site_of
+    from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
+else:
+    __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
     "ABOVE_M",
