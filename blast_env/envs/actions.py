@@ -69,7 +69,7 @@ class ItemThenPlace:
         side = self.block_cells or max(rows, columns, 1)
         block = (row // side) * -(-columns // side) + column // side
         cell = (row % side) * min(side, columns) + column % side
-        return tuple(each for each in (variant, block, cell) if each.any()) or (cell,)
+        return tuple(item for item in (variant, block, cell) if item.any()) or (cell,)
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,9 @@ class _Sight:
         """Return the distance of each placement's centre from the line, along a row of cells."""
         variants = scenario.zone.catalogue.variants
         half_m = (
-            MODULE_SIDE_M / 2.0 * np.array([(each.columns - 1, each.rows - 1) for each in variants])
+            MODULE_SIDE_M
+            / 2.0
+            * np.array([(variant.columns - 1, variant.rows - 1) for variant in variants])
         )
         centres_m = np.stack(scenario.zone.centres_m)
         from_start_m = centres_m[:, np.newaxis] + half_m.T[..., np.newaxis, np.newaxis]
@@ -123,12 +125,14 @@ class _Sight:
 
 
 def _sight(scenario: Scenario, sources: Sequence[AnySource]) -> _Sight:
-    protected = [each for each in scenario.structures if each.protected]
+    protected = [structure for structure in scenario.structures if structure.protected]
     places = _mean(
-        [source_bounds_m(each).centre for each in sources], [each.weight for each in sources]
+        [source_bounds_m(source).centre for source in sources],
+        [source.weight for source in sources],
     )
     target = _mean(
-        [each.rectangle_m.centre for each in protected], [each.weight for each in protected]
+        [structure.rectangle_m.centre for structure in protected],
+        [structure.weight for structure in protected],
     )
     return _Sight(places, target - places)
 
@@ -194,7 +198,7 @@ class NumberedActions:
             sources: The place of the charge as shown to the agent; by default all of the scenario.
         """
         choices = actions.choices(scenario)
-        counts = [int(each.max(initial=-1)) + 1 for each in choices]
+        counts = [int(choice.max(initial=-1)) + 1 for choice in choices]
         *first, finish = np.cumsum([0, *counts]).tolist()
         return cls(scenario, sources or scenario.charge, choices, tuple(first), finish)
 
@@ -281,7 +285,7 @@ class NumberedActions:
         possible = np.zeros_like(chosen.possible)
         possible.flat[places] = True
         possible.flags.writeable = False
-        options = tuple(int(each.flat[places[0]]) for each in self.choices[:made])
+        options = tuple(int(choice.flat[places[0]]) for choice in self.choices[:made])
         return ActionChoice(possible, made, options)
 
     def nearest(self, chosen: ActionChoice, action: int) -> int | None:
@@ -301,14 +305,14 @@ class NumberedActions:
         """
         options = self.choices[chosen.choices]
         wanted = options == action - self.first[chosen.choices]
-        for each, option in zip(self.choices, chosen.options, strict=False):
-            wanted = wanted & (each == option)
+        for choice, option in zip(self.choices, chosen.options, strict=False):
+            wanted = wanted & (choice == option)
         numbers, rows, columns = wanted.nonzero()
         if not len(numbers):
             return None
         up, right = np.indices(self.catalogue.shape)
         distances = (up - rows.mean()) ** 2 + (right - columns.mean()) ** 2
-        items = np.array([each.item for each in self.catalogue.variants])
+        items = np.array([variant.item for variant in self.catalogue.variants])
         same_rotation = np.isin(np.arange(len(items)), numbers)
         for suits in (same_rotation, np.isin(items, items[numbers])):
             candidates = chosen.possible & suits[:, np.newaxis, np.newaxis]

@@ -89,7 +89,10 @@ def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) 
 
 def _common_methods(strategies: Iterable[object]) -> list[str]:
     """Return the public methods common to all the strategies, and `__call__` if they have it."""
-    of_each = [{name for name in dir(each) if callable(getattr(each, name))} for each in strategies]
+    of_each = [
+        {name for name in dir(strategy) if callable(getattr(strategy, name))}
+        for strategy in strategies
+    ]
     common = set.intersection(*of_each)
     return sorted(name for name in common if name == "__call__" or not name.startswith("_"))
 
@@ -156,7 +159,7 @@ class ResetOptions:
     def fix_charge(self) -> bool:
         """Whether any property of the charge is fixed."""
         fixed = (self.charge_position_m, self.tnt_kg, self.charge_height_m)
-        return any(each is not None for each in fixed)
+        return any(item is not None for item in fixed)
 
     def charge(self, drawn: AnyCharge) -> AnyCharge:
         """Return a drawn charge with its fixed properties replaced.

@@ -188,7 +188,7 @@ def _shown_threat(episode: Episode) -> LoadCase:
     """Return the worst threat, with its first realisation."""
     case, layout = episode.case, episode.transition.after
     blasts = episode.evaluator.loads_of_many([(layout, threat) for threat in case.threats])
-    loads = np.array([each.load(case.scenario.objective) for each in blasts])
+    loads = np.array([blast.load(case.scenario.objective) for blast in blasts])
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
 

@@ -326,7 +326,7 @@ def _outcome(
     found |= {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
     if not evaluator.scenario.objective.is_response:
         return found
-    levels = [each.level.label if each.level else "" for each in (protected, unprotected)]
+    levels = [item.level.label if item.level else "" for item in (protected, unprotected)]
     return found | {
         "response": protected.load,
         "unprotected_response": unprotected.load,
@@ -411,7 +411,7 @@ class Episodes:
         if options.blast_seed is not None:
             seeds = options.blast_seed + np.arange(seeds.size).reshape(seeds.shape)
         if options.fix_charge:
-            drawn = tuple(options.charge(each) for each in drawn)
+            drawn = tuple(options.charge(draw) for draw in drawn)
         return site, drawn, seeds
 
     def place(self, indices: Sequence[int], actions: Sequence[int]) -> None:
@@ -520,7 +520,7 @@ class Episodes:
             ILLEGAL_TERM: 0.0 if has_effect else -self.task.illegal.cost,
         }
         if [*terms] != [*episode.terms]:
-            found, named = (", ".join([*each][:-1]) for each in (terms, episode.terms))
+            found, named = (", ".join([*item][:-1]) for item in (terms, episode.terms))
             raise BlastEnvError(
                 f"the reward has the terms {found}, must have those that it names: {named}"
             )
@@ -533,7 +533,7 @@ class Episodes:
         The choices so far for the next piece limit the cells that are shown as free.
         """
         episodes = [self.running[index] for index in indices]
-        observations = [each.shown.observation for each in episodes]
+        observations = [episode.shown.observation for episode in episodes]
         kind = observations[0]
         if not isinstance(kind, BatchedObservation):
             own: list[Any] = [self._observed(index) for index in indices]

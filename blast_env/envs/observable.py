@@ -81,7 +81,9 @@ class VehicleView:
     @classmethod
     def of(cls, scenario: Scenario, sources: tuple[AnySource, ...]) -> "VehicleView":
         """Return the vehicles among the sources of a charge."""
-        return cls(scenario, tuple(each for each in sources if isinstance(each, VehicleSource)))
+        return cls(
+            scenario, tuple(source for source in sources if isinstance(source, VehicleSource))
+        )
 
     def reached(self, layout: Layout) -> BoolArray:
         """Return the mask of squares of the site within reach of a vehicle, (rows, columns)."""
@@ -94,7 +96,7 @@ class VehicleView:
     def stand_off_m(self, layout: Layout) -> float:
         """Return the least stand-off of a vehicle, m; infinite without vehicles."""
         places = (worst_places(self.scenario, source, layout) for source in self.vehicles)
-        return min((each.stand_off_m for each in places), default=inf)
+        return min((place.stand_off_m for place in places), default=inf)
 
 
 class EpisodeObservation(Protocol):
@@ -125,7 +127,7 @@ class BatchedObservation(ABC):
 def one_of(observed: Any, index: int) -> Any:
     """Return one of several observations."""
     if isinstance(observed, dict):
-        return {key: each[index] for key, each in observed.items()}
+        return {key: value[index] for key, value in observed.items()}
     return observed[index]
 
 
@@ -167,7 +169,7 @@ def stock_shares(placements: Placements) -> FloatArray:
     and the share of the budget (1 without a budget).
     """
     left = placements.left[:, 0]
-    zones = _of_rules(placements, lambda each: (each.zone.budget or np.nan, each.zone.stock))
+    zones = _of_rules(placements, lambda item: (item.zone.budget or np.nan, item.zone.stock))
     of_budget = np.where(np.isnan(zones[:, 0]), 1.0, placements.budget_left / zones[:, 0])
     return np.stack((left / zones[:, 1], np.minimum(left / FULL_STOCK, 1.0), of_budget), axis=1)
 
@@ -177,12 +179,12 @@ def _of_rules(
 ) -> FloatArray:
     """Return values of the rules of each placement (placements, n), or of all if equal (1, n)."""
     rules = placements.rules
-    distinct = {id(each): each for each in rules}
-    known = np.array([values(each) for each in distinct.values()], dtype=np.float64)
+    distinct = {id(rule): rule for rule in rules}
+    known = np.array([values(item) for item in distinct.values()], dtype=np.float64)
     if len(distinct) == 1:
         return known
     numbers = {key: number for number, key in enumerate(distinct)}
-    found: FloatArray = known[[numbers[id(each)] for each in rules]]
+    found: FloatArray = known[[numbers[id(rule)] for rule in rules]]
     return found
 
 
@@ -204,10 +206,10 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
         Their heights (items,), and their costs per piece (items,): as a share of the budget, or of
         the dearest item's cost if there is no budget, at most 1.
     """
-    everything = {each.item: each for each in zone.catalogue.variants}.values()
-    costs = np.array([each.cost for each in everything])
+    everything = {variant.item: variant for variant in zone.catalogue.variants}.values()
+    costs = np.array([item.cost for item in everything])
     shares = np.minimum(costs / (zone.budget or costs.max(initial=1.0)), 1.0)
-    return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
+    return np.array([height_share(item.height_m) for item in everything]), np.asarray(shares)
 
 
 def variant_values(zone: BuildZone) -> Plane:
@@ -216,7 +218,7 @@ def variant_values(zone: BuildZone) -> Plane:
     Variants count from 1, and nothing is 0.
     """
     variants = zone.catalogue.variants
-    rows = [(height_share(each.height_m), each.stops_vehicles) for each in variants]
+    rows = [(height_share(variant.height_m), variant.stops_vehicles) for variant in variants]
     return np.array([(0.0, 0.0), *rows], dtype=np.float32).T.copy()
 
 
@@ -231,8 +233,8 @@ def items_placed(placements: Placements) -> Plane:
     on_cells = np.empty((len(legal), 2 + legal.shape[1], *legal.shape[2:]), dtype=np.float32)
     on_cells[:, 2:] = legal
     of_catalogues: dict[int, list[int]] = {}
-    for index, each in enumerate(placements.rules):
-        of_catalogues.setdefault(id(each.catalogue), []).append(index)
+    for index, rule in enumerate(placements.rules):
+        of_catalogues.setdefault(id(rule.catalogue), []).append(index)
     for own in of_catalogues.values():
         tables = variant_values(placements.rules[own[0]].zone)
         which: slice | list[int] = slice(None) if len(own) == len(legal) else own
@@ -243,7 +245,7 @@ def items_placed(placements: Placements) -> Plane:
 
 def items_left(placements: Placements) -> FloatArray:
     """Return the remaining share of the pieces of each item (placements, items)."""
-    stocks = _of_rules(placements, lambda each: each.catalogue.stocks)
+    stocks = _of_rules(placements, lambda item: item.catalogue.stocks)
     left = np.minimum(placements.left[:, 1:], placements.left[:, :1])
     shares: FloatArray = left / np.maximum(stocks, 1)
     return shares

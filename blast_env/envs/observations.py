@@ -135,9 +135,9 @@ class FeaturesEpisode(BatchedObservation):
         shares, has_items = stock_shares(placements), placements.rules[0].catalogue.has_items
         if has_items:
             shares = np.hstack((shares, items_left(placements)))
-        numbers = {id(each): number for number, each in enumerate(episodes)}
+        numbers = {id(episode): number for number, episode in enumerate(episodes)}
         distinct = {number: position for position, number in enumerate(numbers.values())}
-        own = np.array([distinct[numbers[id(each)]] for each in episodes])
+        own = np.array([distinct[numbers[id(episode)]] for episode in episodes])
         constants, variants = (
             np.array([getattr(episodes[number], name) for number in distinct])
             for name in ("constants", "variants")
@@ -152,7 +152,7 @@ class FeaturesEpisode(BatchedObservation):
         vectors = np.empty((len(episodes), length + shows_vehicles), dtype=np.float32)
         _put_vectors(own, constants, variants, shares, legal, occupancy, has_items, vectors)
         if shows_vehicles:
-            stand_offs = _stand_offs([each.vehicles for each in episodes], placements)
+            stand_offs = _stand_offs([episode.vehicles for episode in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
         return vectors
 
@@ -184,8 +184,8 @@ def _put_vectors(
     items = shares.shape[1] - _SHARES
     for episode in range(len(vectors)):
         vector, known = vectors[episode], constants[own[episode]]
-        for each in range(_SHARES):
-            vector[each] = min(max(shares[episode, each], 0.0), 1.0)
+        for index in range(_SHARES):
+            vector[index] = min(max(shares[episode, index], 0.0), 1.0)
         at = _SHARES
         vector[at : at + _SITE] = known[:_SITE]
         at += _SITE
@@ -200,8 +200,8 @@ def _put_vectors(
         vector[at : at + len(known) - _SITE] = known[_SITE:]
         at += len(known) - _SITE
         if has_items:
-            for each in range(items):
-                vector[at + each] = min(max(shares[episode, _SHARES + each], 0.0), 1.0)
+            for index in range(items):
+                vector[at + index] = min(max(shares[episode, _SHARES + index], 0.0), 1.0)
             at += items
             heights, stops = vector[at : at + cells], vector[at + cells : at + 2 * cells]
             of_variants = variants[own[episode]]
@@ -218,7 +218,7 @@ def _put_vectors(
 
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:
     """Return values of several episodes (episodes, ...) as vectors (episodes, n), from 0 to 1."""
-    vectors = [each.reshape(len(each), -1) for each in parts]
+    vectors = [part.reshape(len(part), -1) for part in parts]
     joined: Plane = np.clip(np.hstack(vectors), 0.0, 1.0).astype(np.float32)
     return joined
 
@@ -234,13 +234,15 @@ def _structures(scenario: Scenario) -> FloatArray:
             f"scenario {scenario.name!r} has {len(structures)} structures, the observation"
             f" 'features' has room for {MOST_STRUCTURES}: use 'grid'"
         )
-    largest = max((each.weight for each in structures if each.protected), default=1.0)
+    largest = max(
+        (structure.weight for structure in structures if structure.protected), default=1.0
+    )
     width_m, height_m = scenario.site.width_m, scenario.site.height_m
     rows = np.zeros((MOST_STRUCTURES, 7))
-    for row, each in zip(rows, structures, strict=False):
-        left, bottom, right, top = each.rectangle_m
+    for row, part in zip(rows, structures, strict=False):
+        left, bottom, right, top = part.rectangle_m
         row[:4] = left / width_m, bottom / height_m, right / width_m, top / height_m
-        row[4:] = 1.0, each.weight / largest if each.protected else 0.0, height_share(each.height_m)
+        row[4:] = 1.0, part.weight / largest if part.protected else 0.0, height_share(part.height_m)
     return rows
 
 
@@ -315,12 +317,12 @@ class DictEpisode(BatchedObservation):
     @staticmethod
     def observe_many(episodes: Sequence["DictEpisode"], placements: Placements) -> dict[str, Array]:
         """Return planes and vectors of several episodes, with a leading axis (episodes, ...)."""
-        parts = [stock_shares(placements), np.array([each.site for each in episodes])]
+        parts = [stock_shares(placements), np.array([episode.site for episode in episodes])]
         if placements.rules[0].catalogue.has_items:
             parts.append(items_left(placements))
         if episodes[0].shows_vehicles:
-            parts.append(_stand_offs([each.vehicles for each in episodes], placements))
-        planes = ImageEpisode.observe_many([each.planes for each in episodes], placements)
+            parts.append(_stand_offs([episode.vehicles for episode in episodes], placements))
+        planes = ImageEpisode.observe_many([episode.planes for episode in episodes], placements)
         return {"planes": planes, "vector": _joined(parts)}
 
 
@@ -340,10 +342,10 @@ def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> Fl
 def _stand_offs(vehicles: Sequence[VehicleView], placements: Placements) -> FloatArray:
     """Return the stand-off of each episode as a share of the site's diagonal (episodes, 1)."""
     shares = []
-    for position, each in enumerate(vehicles):
-        site = each.scenario.site
+    for position, vehicle in enumerate(vehicles):
+        site = vehicle.scenario.site
         shares.append(
-            each.stand_off_m(placements.layout(position)) / hypot(site.width_m, site.height_m)
+            vehicle.stand_off_m(placements.layout(position)) / hypot(site.width_m, site.height_m)
         )
     return np.array(shares)[:, np.newaxis]
 

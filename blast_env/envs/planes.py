@@ -179,7 +179,10 @@ def item_channels(catalogue: Catalogue) -> tuple[str, ...]:
     heights, costs, left = (
         tuple(f"{name}:{what}" for name in catalogue.names) for what in ("height", "cost", "left")
     )
-    variants = [f"{each.name}:turned" if each.turned else each.name for each in catalogue.variants]
+    variants = [
+        f"{variant.name}:turned" if variant.turned else variant.name
+        for variant in catalogue.variants
+    ]
     legal = tuple(f"{name}:legal" for name in variants)
     return STRUCTURE_HEIGHT, *heights, *costs, BARRIER_HEIGHT, "stops_vehicles", *left, *legal
 
@@ -314,7 +317,7 @@ class GridEpisode(BatchedObservation):
     @staticmethod
     def observe_many(episodes: Sequence["GridEpisode"], placements: Placements) -> Plane:
         """Return the planes of several episodes (episodes, channels, rows, columns)."""
-        planes = np.array([each.static for each in episodes])
+        planes = np.array([episode.static for episode in episodes])
         GridEpisode.draw(episodes, placements, planes)
         return planes.astype(np.float32) / _LEVELS
 
@@ -339,18 +342,18 @@ class GridEpisode(BatchedObservation):
             names += episodes[0].ending(":left")
             on_cells = np.concatenate((on_cells, items_placed(placements)), axis=1)
             cell_names += [BARRIER_HEIGHT, "stops_vehicles", *episodes[0].ending(":legal")]
-        planes[:, [channels.index(each) for each in names]] = _levels(uniform)[..., None, None]
-        numbers = [channels.index(each) for each in cell_names]
+        planes[:, [channels.index(name) for name in names]] = _levels(uniform)[..., None, None]
+        numbers = [channels.index(cell_name) for cell_name in cell_names]
         levels = _levels(on_cells)
-        for position, (own, of_cells, whole, each) in enumerate(
+        for position, (own, of_cells, whole, episode) in enumerate(
             zip(planes, levels, on_cells, episodes, strict=True)
         ):
-            if each.zone.squares is None:
-                own[numbers] = _levels(each.zone.plane(whole))
+            if episode.zone.squares is None:
+                own[numbers] = _levels(episode.zone.plane(whole))
             else:
-                own[numbers, *each.zone.squares] = of_cells
+                own[numbers, *episode.zone.squares] = of_cells
             if REACH in channels:
-                reached = each.vehicles.reached(placements.layout(position))
+                reached = episode.vehicles.reached(placements.layout(position))
                 own[channels.index(REACH)] = _levels(reached)
 
     def ending(self, ending: str) -> tuple[str, ...]:
@@ -463,8 +466,8 @@ class ImageEpisode(BatchedObservation):
         episodes: Sequence["ImageEpisode"], placements: Placements
     ) -> NDArray[np.uint8]:
         """Return the images of several episodes (episodes, height, width, channels)."""
-        images = np.array([each.static for each in episodes])
+        images = np.array([episode.static for episode in episodes])
         _, rows, columns = episodes[0].planes.static.shape
         planes = np.moveaxis(images[:, :rows, :columns], -1, 1)
-        GridEpisode.draw([each.planes for each in episodes], placements, planes)
+        GridEpisode.draw([episode.planes for episode in episodes], placements, planes)
         return images

@@ -180,9 +180,11 @@ class ParticlesInProgress(BlastInProgress):
         """Return impulses, counts of balls and the time."""
         kinds = self.run.balls().kind
         counts = [(kinds == kind).sum() for kind in _BALL_KINDS]
-        structures = [each for each in self.run.obstacles if each.name != BARRIER_NAME]
+        structures = [obstacle for obstacle in self.run.obstacles if obstacle.name != BARRIER_NAME]
         return {
-            "module_impulses": np.array([p.impulse for each in structures for p in each.parts]),
+            "module_impulses": np.array(
+                [p.impulse for structure in structures for p in structure.parts]
+            ),
             "particle_counts": np.array(counts, dtype=np.int64),
             "time_s": np.array([self.run.time_s]),
         }

@@ -47,7 +47,7 @@ class VisibleThreat:
         charges: tuple[AnyCharge, ...],
     ) -> tuple[AnySource, ...]:
         """Return the charge itself, or the vehicle that brings it."""
-        return tuple(source_of(each) for each in charges)
+        return tuple(source_of(charge) for charge in charges)
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,8 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
 def _sizes(scenario: Scenario, has_room: bool) -> tuple[tuple[object, ...], ...]:
     site, zone = scenario.site, scenario.zone
     variants = [
-        (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
+        (variant.name, variant.turned, variant.rows, variant.columns)
+        for variant in zone.catalogue.variants
     ]
     vehicles = ("some",) if scenario.vehicles or has_room else ("none",)
     term = (scenario.objective.term,)

@@ -49,7 +49,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         max_episode_steps: int | None = None,
         **arguments: Any,
     ) -> None:
-        modes = [each.value for each in AutoresetMode]
+        modes = [mode.value for mode in AutoresetMode]
         mode = getattr(autoreset_mode, "value", autoreset_mode)
         check_names("autoreset_mode", [mode], modes)
         if arguments.get("render_mode") is not None:
@@ -125,7 +125,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The random numbers of each environment; `reset` seeds them, nothing sets them."""
         self._seed_missing()
-        return tuple(each for each in self._rngs if each is not None)
+        return tuple(rng for rng in self._rngs if rng is not None)
 
     def _seed_missing(self) -> None:
         """Seed the random numbers of environments that have none."""
@@ -258,11 +258,11 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         names = running[0].terms
         arrays: dict[str, Any] = {
             "action_mask": self.episodes.masks(self._all),
-            "invalid_actions": np.array([each.invalid_actions for each in running]),
-            "placed": np.array([len(each) for each in layouts.layouts]),
+            "invalid_actions": np.array([item.invalid_actions for item in running]),
+            "placed": np.array([len(layout) for layout in layouts.layouts]),
             "layout": layouts.table.copy(),
-        } | {name: each.copy() for name, each in self._noted.items()}
-        terms = {name: np.array([each.terms[name] for each in running]) for name in names}
+        } | {name: value.copy() for name, value in self._noted.items()}
+        terms = {name: np.array([item.terms[name] for item in running]) for name in names}
         if not known.all():
             for values in (*arrays.values(), *terms.values()):
                 values[~known] = None if values.dtype == object else 0

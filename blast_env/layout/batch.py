@@ -53,10 +53,11 @@ class PlacementRules:
     def of(cls, start: LayoutState) -> "PlacementRules":
         """Return the rules on the site of a layout."""
         scenario, catalogue = start.scenario, start.catalogue
-        sizes = tuple((each.rows, each.columns) for each in catalogue.variants)
+        sizes = tuple((variant.rows, variant.columns) for variant in catalogue.variants)
         dearest = float(start.costs[start.fits].max(initial=0.0))
         variants = np.array(
-            [(each.rows, each.columns, each.item) for each in catalogue.variants], dtype=np.int64
+            [(variant.rows, variant.columns, variant.item) for variant in catalogue.variants],
+            dtype=np.int64,
         ).reshape(-1, 3)
         return cls(
             *(scenario, scenario.zone, catalogue, start.costs, dearest, sizes, start.passable),

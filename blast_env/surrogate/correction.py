@@ -80,10 +80,10 @@ def apart_m3(one: FloatArray, others: FloatArray) -> FloatArray:
 
 def stacked(barriers: Sequence[FloatArray]) -> FloatArray:
     """Return barriers as one array (barriers, pieces, 5), padded with pieces of no volume."""
-    most = max((len(each) for each in barriers), default=0)
+    most = max((len(barrier) for barrier in barriers), default=0)
     found = np.zeros((len(barriers), most, 5))
-    for own, each in zip(found, barriers, strict=True):
-        own[: len(each)] = each
+    for own, barrier in zip(found, barriers, strict=True):
+        own[: len(barrier)] = barrier
     return found
 
 
@@ -95,4 +95,4 @@ def _volume_m3(barriers: FloatArray) -> FloatArray:
 
 def _all_apart_m3(some: FloatArray, others: FloatArray) -> FloatArray:
     """Return `apart_m3` of each pair (some, others)."""
-    return np.array([apart_m3(each, others) for each in some]).reshape(len(some), len(others))
+    return np.array([apart_m3(item, others) for item in some]).reshape(len(some), len(others))

@@ -34,8 +34,8 @@ def _zero_loads(site: SurrogateSite) -> tuple[StructureLoad, ...]:
     """Return no load on each structure, which is that of those that are not protected."""
     peak_pa = 0.0 if site.counts_peaks else None
     return tuple(
-        StructureLoad.on(each, 0.0, peak_pa, notes=_NOTES, validation=_GUESSED)
-        for each in site.scenario.structures
+        StructureLoad.on(structure, 0.0, peak_pa, notes=_NOTES, validation=_GUESSED)
+        for structure in site.scenario.structures
     )
 
 
@@ -46,7 +46,7 @@ class _Served:
         self.site = site
         structures = site.scenario.structures
         self._zero_loads = _zero_loads(site)
-        self._place = {each.name: number for number, each in enumerate(structures)}
+        self._place = {structure.name: number for number, structure in enumerate(structures)}
         self._of_modules = np.repeat(np.arange(len(structures)), [s.modules for s in structures])
 
     def loads(self, guess: Guess) -> list[BlastLoads]:
@@ -147,22 +147,22 @@ class SurrogateEngine(Engine):
         """Return the same for several blasts, by one pass of the networks per site."""
         found: list[BlastLoads | None] = [None] * len(blasts)
         of_sites: dict[str, list[int]] = {}
-        for number, each in enumerate(blasts):
-            of_sites.setdefault(each.scenario.content_hash, []).append(number)
+        for number, blast in enumerate(blasts):
+            of_sites.setdefault(blast.scenario.content_hash, []).append(number)
         for numbers in of_sites.values():
             own = [blasts[number] for number in numbers]
             # The first site compiles everything; to listen takes longer than a prediction.
             compiles = compilation_notice("the surrogate (some 10 s)")
             with nullcontext() if self._sites else compiles:
                 served = self._site(own[0].scenario)
-                charges = [charge_against(*each[:3]) for each in own]
-                layouts = [each.layout for each in own]
+                charges = [charge_against(*number[:3]) for number in own]
+                layouts = [number.layout for number in own]
                 guess = self.surrogate.guess(served.site, layouts, charges)
             if self.safe:
                 guess = self.surrogate.upper_ends(guess, np.array([bool(e.layout) for e in own]))
             for number, loads in zip(numbers, served.loads(guess), strict=True):
                 found[number] = loads
-        return [each for each in found if each is not None]
+        return [blast_loads for blast_loads in found if blast_loads is not None]
 
     def _site(self, scenario: Scenario) -> _Served:
         key = scenario.content_hash

@@ -134,7 +134,7 @@ class Samples:
             barrier = site.barrier(elements(layout))
             of_points = approach.features(barrier).astype(np.float32)
             of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
-            names = [each.name for each in site.protected]
+            names = [structure.name for structure in site.protected]
             for *_, structure in loads:
                 own = approach.points_of(names.index(structure))
                 features.append(of_points[own])
@@ -145,10 +145,10 @@ class Samples:
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         return cls(
             features=np.concatenate(features),
-            relations=np.concatenate([each.reshape(-1, RELATIONS) for each in related]),
+            relations=np.concatenate([thing.reshape(-1, RELATIONS) for thing in related]),
             area_m2=np.concatenate(area_m2),
-            counts=np.array([len(each) for each in features]),
-            solids=np.array([len(each) for each in related]),
+            counts=np.array([len(feature) for feature in features]),
+            solids=np.array([len(thing) for thing in related]),
             impulse=Loads(
                 np.concatenate(impulses),
                 np.log(rows["impulse_pa_s"].to_numpy()),
@@ -168,8 +168,8 @@ class Samples:
 
 def elements(text: str) -> tuple[Element, ...]:
     """Return the layout of a row of the table."""
-    found = (tuple(each) for each in json.loads(text))
-    return tuple(each if len(each) == 2 else Piece(*each) for each in found)
+    found = (tuple(load) for load in json.loads(text))
+    return tuple(prediction if len(prediction) == 2 else Piece(*prediction) for prediction in found)
 
 
 def fit(
@@ -196,11 +196,11 @@ def fit(
     """
     points = samples.features[np.repeat(chosen, samples.counts)]
     solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
-    mean = np.concatenate([each.mean(axis=0, dtype=np.float64) for each in (points, solids)])
-    scale = np.concatenate([each.std(axis=0, dtype=np.float64) for each in (points, solids)])
+    mean = np.concatenate([array.mean(axis=0, dtype=np.float64) for array in (points, solids)])
+    scale = np.concatenate([item.std(axis=0, dtype=np.float64) for item in (points, solids)])
     scale += _LEAST_SCALE
     cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
-    own = [each for each in cases if len(each)]
+    own = [case for case in cases if len(case)]
     tensors = _Tensors.of(samples, mean, scale, device)
     of_both = (samples.impulse, samples.peak) if peaks else (samples.impulse,)
     tasks = []
@@ -370,8 +370,8 @@ class _Target:
     @classmethod
     def of(cls, loads: Loads, device: str) -> "_Target":
         known, target = (
-            torch.from_numpy(each.astype(np.float32)).to(device)
-            for each in (loads.known, loads.target)
+            torch.from_numpy(array.astype(np.float32)).to(device)
+            for array in (loads.known, loads.target)
         )
         return cls(known, target, loads.power)
 
@@ -404,8 +404,8 @@ class _Tensors:
     def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray, device: str) -> "_Tensors":
         of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
         features, relations = (
-            torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32)).to(device)
-            for each, own in ((samples.features, of_points), (samples.relations, of_solids))
+            torch.from_numpy(bounded(item, mean[own], scale[own]).astype(np.float32)).to(device)
+            for item, own in ((samples.features, of_points), (samples.relations, of_solids))
         )
         area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32)).to(device)
         starts = np.cumsum([0, *samples.counts[:-1]])
@@ -422,7 +422,7 @@ class _Tensors:
         """
         errors = self._errors(network, target, np.concatenate(groups))
         parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
-        common = torch.cat([each.mean().expand(len(each)) for each in parts])
+        common = torch.cat([part.mean().expand(len(part)) for part in parts])
         return (errors - common).square().mean() + _COMMON * common.square().mean()
 
     def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
@@ -487,7 +487,7 @@ class _Network(nn.Module):
     def plain(self) -> Member:
         """Return the weights and biases as arrays."""
         arrays: Sequence[FloatArray] = [
-            each.detach().cpu().numpy().astype(np.float64) for each in self.parameters()
+            parameter.detach().cpu().numpy().astype(np.float64) for parameter in self.parameters()
         ]
         return Member(*(array.T if array.ndim == 2 else array for array in arrays))
 

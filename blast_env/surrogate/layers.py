@@ -77,16 +77,16 @@ def four_rows(
         low_1, high_1 = load(base, base_1 + output), load(base, base_1 + output + lanes)
         low_2, high_2 = load(base, base_2 + output), load(base, base_2 + output + lanes)
         low_3, high_3 = load(base, base_3 + output), load(base, base_3 + output + lanes)
-        for each in range(inputs):
-            low = load(weight, each * outputs + output)
-            high = load(weight, each * outputs + output + lanes)
-            value = fill(total, get(given, each))
+        for index in range(inputs):
+            low = load(weight, index * outputs + output)
+            high = load(weight, index * outputs + output + lanes)
+            value = fill(total, get(given, index))
             low_0, high_0 = value * low + low_0, value * high + high_0
-            value = fill(total, get(given, row_1 + each))
+            value = fill(total, get(given, row_1 + index))
             low_1, high_1 = value * low + low_1, value * high + high_1
-            value = fill(total, get(given, row_2 + each))
+            value = fill(total, get(given, row_2 + index))
             low_2, high_2 = value * low + low_2, value * high + high_2
-            value = fill(total, get(given, row_3 + each))
+            value = fill(total, get(given, row_3 + index))
             low_3, high_3 = value * low + low_3, value * high + high_3
         store(total, output, _silu(total, low_0))
         store(total, output + lanes, _silu(total, high_0))
@@ -102,12 +102,12 @@ def four_rows(
 def four_sums(given: Any, inputs: int, weight: Any, bias: Any) -> Any:
     """Return the only output of the last layer, without a bend, for four rows."""
     zero = one = two = three = bias
-    for each in range(inputs):
-        by = get(weight, each)
-        zero += get(given, each) * by
-        one += get(given, inputs + each) * by
-        two += get(given, 2 * inputs + each) * by
-        three += get(given, 3 * inputs + each) * by
+    for index in range(inputs):
+        by = get(weight, index)
+        zero += get(given, index) * by
+        one += get(given, inputs + index) * by
+        two += get(given, 2 * inputs + index) * by
+        three += get(given, 3 * inputs + index) * by
     return zero, one, two, three
 
 
@@ -117,8 +117,8 @@ def _take(rows: Any, first: int, given: Any) -> None:
     count, inputs = rows.shape
     for number in range(ROWS_AT_ONCE):
         row = min(first + number, count - 1)
-        for each in range(inputs):
-            put(given, number * inputs + each, rows[row, each])
+        for index in range(inputs):
+            put(given, number * inputs + index, rows[row, index])
 
 
 def buffers(*widths: int) -> tuple[SingleArray, ...]:
@@ -179,8 +179,8 @@ def _put_two_layers(
             four_rows(at, inputs, weights[0], width, biases[0], same, between)
             four_rows(between, width, weights[1], outputs, biases[1], same, end)
             for number in range(min(ROWS_AT_ONCE, count - row)):
-                for each in range(outputs):
-                    found[member, row + number, each] = last[number, each]
+                for index in range(outputs):
+                    found[member, row + number, index] = last[number, index]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
@@ -197,8 +197,8 @@ def first_sums(rows: SingleArray, weights: SingleArray, bias: SingleArray) -> Si
     for member in range(members):
         for row in range(rows.shape[1]):
             found[member, row] = bias[member]
-            for each in range(inputs):
-                value = rows[member if len(rows) > 1 else 0, row, each]
+            for index in range(inputs):
+                value = rows[member if len(rows) > 1 else 0, row, index]
                 for output in range(outputs):
-                    found[member, row, output] += value * weights[member, each, output]
+                    found[member, row, output] += value * weights[member, index, output]
     return found

@@ -140,15 +140,15 @@ class Guess(NamedTuple):
         load, structures = site.scenario.objective.load, site.protected
         if site.scenario.objective.is_response:
             return np.array(
-                [self._response(site, index, each) for index, each in enumerate(layouts)]
+                [self._response(site, index, layout) for index, layout in enumerate(layouts)]
             )
         peak_pa = np.zeros_like(self.impulse_pa_s) if self.peak_pa is None else self.peak_pa
         both = np.stack((self.impulse_pa_s, peak_pa), axis=2).tolist()
         return np.array(
             [
                 sum(
-                    load(impulse, peak, each.weight, each.counted_peak_weight)
-                    for each, (impulse, peak) in zip(structures, of_layout, strict=True)
+                    load(impulse, peak, structure.weight, structure.counted_peak_weight)
+                    for structure, (impulse, peak) in zip(structures, of_layout, strict=True)
                 )
                 for of_layout in both
             ]
@@ -167,8 +167,8 @@ class Guess(NamedTuple):
         assert self.peak_pa is not None
         loads = zip(self.peak_pa[index].tolist(), self.impulse_pa_s[index].tolist(), strict=True)
         return sum(
-            each.weight * site.response(each.name, layout, *load)
-            for each, load in zip(site.protected, loads, strict=True)
+            structure.weight * site.response(structure.name, layout, *load)
+            for structure, load in zip(site.protected, loads, strict=True)
         )
 
 
@@ -209,7 +209,7 @@ class Networks:
             np.stack(arrays) if members else np.empty((0, *shape))
             for arrays, shape in zip_longest(zip(*members, strict=True), SHAPES)
         ]
-        single = [np.ascontiguousarray(each, dtype=np.float32) for each in stacked]
+        single = [np.ascontiguousarray(item, dtype=np.float32) for item in stacked]
         self._layers = Member(*single)
 
     def messages(self, scaled: FloatArray) -> SingleArray:
@@ -286,8 +286,8 @@ class Surrogate:
     def digest(self) -> str:
         """Digest of all numbers, which identifies the surrogate."""
         members = (*self.impulse.members, *self.peak.members)
-        arrays = (self.mean, self.scale, *(each for member in members for each in member))
-        numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        arrays = (self.mean, self.scale, *(item for member in members for item in member))
+        numbers = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         return sha256(numbers).hexdigest()[:16]
 
     def guess(
@@ -313,18 +313,18 @@ class Surrogate:
         met = [(approach, *self._met(site, approach, boxes)) for approach, boxes in groups]
         place = np.empty(len(layouts), dtype=np.int64)
         place[[number for numbers in of_charges.values() for number in numbers]] = range(len(place))
-        area_m2 = np.concatenate([np.tile(each.area_m2, len(own)) for each, _, own in met])
+        area_m2 = np.concatenate([np.tile(item.area_m2, len(own)) for item, _, own in met])
         starts = self._starts(met)
 
         def of(which: int, known: Callable[[Approach], FloatArray]) -> list[FloatArray]:
             power = self._of_loads[which][1]
-            differs = [each.differs(own, which) for _, each, own in met]
-            logs = [np.tile(known(each), len(own)) for each, _, own in met]
+            differs = [item.differs(own, which) for _, item, own in met]
+            logs = [np.tile(known(item), len(own)) for item, _, own in met]
             loads = log_loads(
                 np.concatenate(differs, axis=1), np.concatenate(logs), area_m2, starts, power
             )
             both = _mean_and_spread(loads)
-            return [each.reshape(len(layouts), -1)[place] for each in both]
+            return [estimate.reshape(len(layouts), -1)[place] for estimate in both]
 
         impulse = of(0, attrgetter("log_impulse"))
         if not site.counts_peaks:
@@ -389,7 +389,7 @@ class Surrogate:
 
         def sent(related: FloatArray) -> list[SingleArray]:
             rows = self.related(related.reshape(-1, RELATIONS))
-            of_all = [each.messages(rows) for each, _ in kinds]
+            of_all = [item.messages(rows) for item, _ in kinds]
             return [
                 own.reshape(len(own), *related.shape[:2], MESSAGE).swapaxes(0, 1) for own in of_all
             ]
@@ -399,8 +399,8 @@ class Surrogate:
             bounds = self.mean[of_shares], self.scale[of_shares], _MOST_SPREADS
             scaled = self.scaled(approach.on_empty)
             layers = [
-                networks.at_points(scaled, each.sum(axis=0))
-                for (networks, _), each in zip(kinds, sent(approach.solids), strict=True)
+                networks.at_points(scaled, single_array.sum(axis=0))
+                for (networks, _), single_array in zip(kinds, sent(approach.solids), strict=True)
             ]
             return KnownPieces(
                 approach.ways, bounds, layers, lambda pieces: sent(approach.relations(pieces))
@@ -541,9 +541,9 @@ def _networks(members: Sequence[Sequence[Sequence[float]]]) -> Networks:
     return Networks(
         [
             Member(
-                *(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True))
+                *(np.array(flat).reshape(shape) for flat, shape in zip(member, SHAPES, strict=True))
             )
-            for each in members
+            for member in members
         ]
     )
 

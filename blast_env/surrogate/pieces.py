@@ -72,7 +72,9 @@ class KnownPieces:
         self._numbers: dict[Box, int] = {}
         self._stopped: Counts = _of_places(ways.stopped[np.newaxis])
         self._is_open: BoolArray = ways.is_straight_open[np.newaxis]
-        empty = [(0, len(each.base), self.points, len(each.first[0]) - SHARES) for each in layers]
+        empty = [
+            (0, len(layer.base), self.points, len(layer.first[0]) - SHARES) for layer in layers
+        ]
         self._messages = [np.zeros((1, *shape[1:]), dtype=np.float32) for shape in empty]
 
     @property
@@ -83,8 +85,8 @@ class KnownPieces:
     @property
     def nbytes(self) -> int:
         """Size in memory."""
-        of_messages = sum(each.nbytes for each in self._messages)
-        of_messages += sum(each.base.nbytes for each in self._layers)
+        of_messages = sum(message.nbytes for message in self._messages)
+        of_messages += sum(layer.base.nbytes for layer in self._layers)
         return self._stopped.nbytes + self._is_open.nbytes + of_messages
 
     def numbers_of(self, layouts: Sequence[Sequence[Box]]) -> Numbers:
@@ -93,12 +95,12 @@ class KnownPieces:
         Pieces that are not known yet are computed.
         """
         numbers = self._numbers
-        new = [box for each in layouts for box in each if box not in numbers]
+        new = [box for layout in layouts for box in layout if box not in numbers]
         if new:
             self._meet(list(dict.fromkeys(new)))
         found: Numbers = np.zeros((len(layouts), max(map(len, layouts)) + 1), dtype=np.int32)
-        for own, each in zip(found, layouts, strict=True):
-            own[: len(each)] = [numbers[box] for box in each]
+        for own, layout in zip(found, layouts, strict=True):
+            own[: len(layout)] = [numbers[box] for box in layout]
         return found
 
     def differs(self, layouts: Numbers, networks: int) -> SingleArray:
@@ -218,15 +220,15 @@ def _put_differs(
             for point in range(0, points, ROWS_AT_ONCE):
                 for number in range(ROWS_AT_ONCE):
                     row = min(point + number, points - 1)
-                    for each in range(SHARES):
-                        given[number, each] = shares[row, each]
-                    for each in range(length):
-                        given[number, SHARES + each] = np.float32(0.0)
+                    for index in range(SHARES):
+                        given[number, index] = shares[row, index]
+                    for index in range(length):
+                        given[number, SHARES + index] = np.float32(0.0)
                     for piece in layouts[layout]:
                         if piece == 0:
                             break
-                        for each in range(length):
-                            given[number, SHARES + each] += messages[piece, member, row, each]
+                        for index in range(length):
+                            given[number, SHARES + index] += messages[piece, member, row, index]
                 at_1, at_2 = min(point + 1, points - 1), min(point + 2, points - 1)
                 at_3 = min(point + 3, points - 1)
                 rows = point * width, at_1 * width, at_2 * width, at_3 * width

@@ -79,12 +79,12 @@ class WallPoints:
             structures: The structures.
             air_m: Height of structures without a height of their own.
         """
-        heights_m = [each.height_m or air_m for each in structures]
+        heights_m = [structure.height_m or air_m for structure in structures]
         apart = _apart(structures, heights_m)
-        tables = [_points(*each, apart) for each in zip(structures, heights_m, strict=True)]
-        starts: IntArray = np.cumsum([0, *(len(each) for each in tables[:-1])])
+        tables = [_points(*item, apart) for item in zip(structures, heights_m, strict=True)]
+        starts: IntArray = np.cumsum([0, *(len(table) for table in tables[:-1])])
         table = np.concatenate(tables) if tables else np.empty((0, 8))
-        places_m, outward = (np.ascontiguousarray(each) for each in (table[:, :3], table[:, 3:5]))
+        places_m, outward = (np.ascontiguousarray(item) for item in (table[:, :3], table[:, 3:5]))
         return cls(starts, places_m, outward, table[:, 5], table[:, 6], table[:, 7])
 
 
@@ -117,8 +117,8 @@ def _walls(
     """Yield length, outward normal and, of a polygon, line of each counted wall."""
     left, bottom, right, top = structure.rectangle_m
     if structure.footprint is not None:
-        own = (each for each in structure.footprint.walls if each.side in structure.faces)
-        yield from ((each.length_m, each.normal, each) for each in own)
+        own = (wall for wall in structure.footprint.walls if wall.side in structure.faces)
+        yield from ((wall.length_m, wall.normal, wall) for wall in own)
         return
     for face in structure.faces:
         yield top - bottom if OUTWARDS[face][0] else right - left, OUTWARDS[face], None
@@ -201,26 +201,28 @@ class SurrogateSite:
     def __init__(self, scenario: Scenario, memory: Memory | None = None) -> None:
         self.scenario = scenario
         self.memory = Memory() if memory is None else memory
-        self.protected = tuple(each for each in scenario.structures if each.protected)
+        self.protected = tuple(
+            structure for structure in scenario.structures if structure.protected
+        )
         self.counts_peaks = scenario.objective.needs_peaks
         self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
         air_m = scenario.air_height_m
         self._solids = np.array(
             [
-                [*box, each.height_m or air_m]
-                for each in scenario.structures
-                if not is_open_below(each, scenario.structures)
-                for box in each.boxes_m
+                [*box, structure.height_m or air_m]
+                for structure in scenario.structures
+                if not is_open_below(structure, scenario.structures)
+                for box in structure.boxes_m
             ]
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
         self._boxes: dict[Element, Box] = {}
         self._triangular = {
-            each.name: TriangularLoads(
-                [bay for bay in self.alternatives if bay.structure == each.name]
+            structure.name: TriangularLoads(
+                [bay for bay in self.alternatives if bay.structure == structure.name]
             )
-            for each in self.protected
+            for structure in self.protected
         }
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
         self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
@@ -254,7 +256,7 @@ class SurrogateSite:
             peak_pa: The peak overpressure.
             impulse_pa_s: The impulse per area.
         """
-        measures = frozenset(each for each in layout if isinstance(each, Measure))
+        measures = frozenset(element for element in layout if isinstance(element, Measure))
         asked = structure, measures, peak_pa, impulse_pa_s
         if asked not in self._responses:
             if measures not in self._named:
@@ -278,21 +280,21 @@ class SurrogateSite:
         """Return the same piece by piece."""
         zone = self.scenario.zone
         if not zone.items:
-            sides = [zone.element_rectangle_m(each) for each in standing(layout)]
-            return [self._box(each, zone.height_m) for each in _in_lines(sides)]
+            sides = [zone.element_rectangle_m(element) for element in standing(layout)]
+            return [self._box(in_line, zone.height_m) for in_line in _in_lines(sides)]
         found = []
-        for each in standing(layout):
-            if each not in self._boxes:
-                height_m = zone.catalogue.variant(each).height_m
-                self._boxes[each] = self._box(zone.element_rectangle_m(each), height_m)
-            found.append(self._boxes[each])
+        for element in standing(layout):
+            if element not in self._boxes:
+                height_m = zone.catalogue.variant(element).height_m
+                self._boxes[element] = self._box(zone.element_rectangle_m(element), height_m)
+            found.append(self._boxes[element])
         return found
 
     def _box(self, rectangle_m: Rectangle, own_m: float | None) -> Box:
         """Return the rectangle and the top of a piece of a height, on its ground."""
         if not own_m:
             return (*rectangle_m, self.scenario.air_height_m)
-        terraces = [each for each in self.scenario.structures if each.carries]
+        terraces = [structure for structure in self.scenario.structures if structure.carries]
         return (*rectangle_m, ground_below_m(terraces, rectangle_m) + own_m)
 
     def _approach_of(self, charge: Charge) -> Approach:
@@ -340,7 +342,7 @@ def _in_lines(boxes: Sequence[Rectangle]) -> list[Rectangle]:
 def _lines(boxes: Sequence[Rectangle], along: int) -> list[Rectangle]:
     """Return boxes of one size with those side by side along an axis as one."""
     lines: list[Rectangle] = []
-    for box in sorted(boxes, key=lambda each: (each[1 - along], each[along])):
+    for box in sorted(boxes, key=lambda box: (box[1 - along], box[along])):
         last = lines[-1] if lines else None
         if last is not None and last[1 - along] == box[1 - along] and last[2 + along] == box[along]:
             lines[-1] = Rectangle(*last[:2], *box[2:])
