@@ -7,12 +7,13 @@ core updates per second. docs/howto/app.md compares estimates with measured cost
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cbrt, ceil, expm1, prod
+from math import cbrt, ceil, expm1, pi, prod
 from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.gas.ending import SOUND_M_S, corners_m, sound_s, watched_structures
 from blast_env.gas.settings import GasSettings
+from blast_env.geometry import Rectangle
 from blast_env.site.blast_site import BlastSite
 
 MOST_BYTES: Final = 8 * 2**30
@@ -33,7 +34,13 @@ _PARTS: Final = 100
 """Number of intervals of a run in which updated cells are counted."""
 
 _CELLS_PER_S: Final = 35e6
+_ADAPTIVE_CELLS_PER_S: Final = 12e6
+_BLOCKS_ALONG: Final = 2.0
+_BLOCKS_AT_WALLS: Final = 1.0
+"""Thickness of small cells along a front and at walls, in blocks; fitted to blasts on the bundled
+sites."""
 _BYTES_PER_CELL: Final = 28.0
+_ADAPTIVE_BYTES_PER_CELL: Final = 10.0
 _PROCESS_BYTES: Final = 270e6
 _DRAWING_S: Final = 2.5
 
@@ -47,17 +54,19 @@ class CostGuess:
         steps: Number of steps until the loads are known.
         memory_bytes: Memory of the process.
         moved: Number of cell updates, summed over all steps.
+        cells_per_s: Number of cell updates per second of a busy or old core.
     """
 
     cells: int
     steps: int
     memory_bytes: float
     moved: float
+    cells_per_s: float = _CELLS_PER_S
 
     @property
     def seconds(self) -> float:
         """Time on a busy or old core, without films; a fast core takes half to 80 % of it."""
-        return self.moved / _CELLS_PER_S
+        return self.moved / self.cells_per_s
 
     def check(self, settings: GasSettings) -> None:
         """Refuse a blast that costs too much.
@@ -90,13 +99,13 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
     scale = cbrt(site.charge.tnt_kg / 100.0)
     watched = watched_structures(site, settings.until)
     end_s = sound_s(site, corners_m(site, watched)) + max(_AFTER_S * scale, response_s)
-    part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
-    left_m, bottom_m, right_m, top_m = site.site_m
-    sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
+    part_s, sides_m = (settings.until_s or end_s) / _PARTS, _sides_m(site)
+    if settings.is_adaptive:
+        return _cost_of_adaptive(settings, site, part_s, scale)
     steps, moved = 0.0, 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
-        front_m = SOUND_M_S * now_s - ahead_m * expm1(-now_s / (_AHEAD_AFTER_S * scale))
+        front_m = _front_m(now_s, scale)
         cell_m = settings.smallest_m * 2.0 ** sum(front_m > run_m for run_m in settings.doubled_m)
         step_s = cell_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
         x, y, z = _cells_in(sides_m, cell_m, settings, margin=False)
@@ -105,6 +114,66 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
         moved += part_s / step_s * min(x, 2.0 * run) * min(y, 2.0 * run) * min(z, run)
     cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
     return CostGuess(cells, ceil(steps), _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
+
+
+def _sides_m(site: BlastSite) -> tuple[float, float, float]:
+    """Return width, depth and height of the air of a site."""
+    left_m, bottom_m, right_m, top_m = site.site_m
+    return right_m - left_m, top_m - bottom_m, site.air_height_m
+
+
+def _front_m(now_s: float, scale: float) -> float:
+    """Return the path of the front in the open."""
+    return SOUND_M_S * now_s - _AHEAD_M * scale * expm1(-now_s / (_AHEAD_AFTER_S * scale))
+
+
+def _cost_of_adaptive(
+    settings: GasSettings, site: BlastSite, part_s: float, scale: float
+) -> CostGuess:
+    """Return the estimated cost of a blast on adaptive cells.
+
+    1. Cells of the largest size are those behind the front.
+    2. Blocks of smaller cells lie along the front, within the site, and those of the second size
+       along walls, too.
+
+    Args:
+        settings: The settings of the run.
+        site: The structures and the charge.
+        part_s: Length of a part of the run.
+        scale: Cube root of the mass over 100 kg.
+    """
+    sides_m = width_m, depth_m, height_m = _sides_m(site)
+    count = settings.levels
+    largest_m = settings.smallest_m * 2.0 ** (count - 1)
+    around_m = 2.0 * (settings.margin_m + settings.border_m / 4.0)
+    walls_m2 = sum(_walls_m2(each.rectangle_m, each.height_m) for each in site.structures)
+    steps, moved = 0.0, 0.0
+    for part in range(_PARTS):
+        now_s = (part + 0.5) * part_s
+        front_m = _front_m(now_s, scale)
+        step_s = settings.smallest_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
+        steps += part_s / step_s
+        behind = min(width_m + around_m, 2.0 * front_m) * min(depth_m + around_m, 2.0 * front_m)
+        behind *= min(height_m + 0.5 * around_m, front_m)
+        passed = min(2.0 * front_m / max(width_m, depth_m), 1.0)
+        along_m2 = min(2.0 * pi * front_m, width_m + depth_m) * min(front_m, height_m)
+        for level in range(count):
+            cell_m = largest_m / 2.0**level
+            volume = behind if level == 0 else _BLOCKS_ALONG * 8.0 * cell_m * along_m2
+            if level == 1:
+                volume += _BLOCKS_AT_WALLS * 8.0 * cell_m * walls_m2 * passed
+            own_steps = part_s / step_s / 2.0 ** (count - 1 - level)
+            moved += own_steps * min(volume, behind) / cell_m**3
+    cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
+    memory = _PROCESS_BYTES + _ADAPTIVE_BYTES_PER_CELL * cells
+    return CostGuess(cells, ceil(steps), memory, moved, _ADAPTIVE_CELLS_PER_S)
+
+
+def _walls_m2(rectangle_m: Rectangle, height_m: float | None) -> float:
+    """Return the area of the walls and the roof of a structure."""
+    left_m, bottom_m, right_m, top_m = rectangle_m
+    width_m, depth_m = right_m - left_m, top_m - bottom_m
+    return 2.0 * (width_m + depth_m) * (height_m or 0.0) + width_m * depth_m
 
 
 def _cells_in(

@@ -94,7 +94,7 @@ def _variables(state: Any, cells: int, at: int, axis: int, fuel: bool) -> tuple[
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _safe_variables(
+def safe_variables(
     state: Any, cells: int, at: int, axis: int, fuel: bool, notes: Any
 ) -> tuple[Variables, Any]:
     """Return the variables after raising density and pressure to the floor."""
@@ -151,7 +151,7 @@ def _half_slope(low: Any, here: Any, high: Any, quarter: Any, zero: Any) -> Any:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
+def ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
     """Return own variables of cells of air, and elsewhere the image of the others.
 
     `side` is the factor of the normal velocity: -1 in a mirror, 1 beyond an open face.
@@ -167,7 +167,7 @@ def _ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _at_faces(
+def at_faces(
     state: Any,
     low: Variables,
     here: Variables,
@@ -223,7 +223,7 @@ def _at_faces(
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) -> Variables:
+def hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) -> Variables:
     """Return the fluxes through faces from the variables on their two sides.
 
     Args:
@@ -293,7 +293,7 @@ def _hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) 
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _update(
+def update(
     state: Any,
     cells: int,
     at: int,
@@ -339,7 +339,7 @@ def _record_walls(flux: Any, vector: int, recorded: Any, work: Any) -> None:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
+def note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
     """Keep the largest speeds of signals along any axis."""
     _, u, v, w, p, _ = here
     most = larger(larger(size(u), size(v)), size(w))
@@ -348,7 +348,8 @@ def _note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _still_air(state: Any, still: Any) -> Variables:
+def still_air(state: Any, still: Any) -> Variables:
+    """Return the variables of still air."""
     zero = fill(state, 0.0)
     p = fill(state, GAMMA - 1.0) * fill(state, get(still, ENERGY))
     return fill(state, 1.0), zero, zero, zero, p, zero
@@ -382,11 +383,11 @@ def _sweep_across(
         recorded: Places of the pressures and tables of recorded faces.
     """
     state, code, still, narrow, work, notes, cells = gas
-    air, zero = _still_air(state, still), fill(state, 0.0)
+    air, zero = still_air(state, still), fill(state, 0.0)
     vectors = axis * (cells // lanes_at(state))
     low, before, flux_before, ratio_before = air, air, air, zero
     at = begin + first * stride
-    here, per_r = _safe_variables(state, cells, at, axis, fuel, notes)
+    here, per_r = safe_variables(state, cells, at, axis, fuel, notes)
     for m in range(first, end + 1):
         high, per_r_high, below, above, ratio_here = air, per_r, air, air, zero
         # Rows lie far apart in memory: begin to load the next vector of this one.
@@ -395,28 +396,28 @@ def _sweep_across(
         is_clear = all_zero(state, code, at - stride) and all_zero(state, code, at)
         if m < end:
             if measure:
-                _note_signals(state, here, per_r, work)
+                note_signals(state, here, per_r, work)
             if m + 1 < end:
-                high, per_r_high = _safe_variables(state, cells, at + stride, axis, fuel, notes)
+                high, per_r_high = safe_variables(state, cells, at + stride, axis, fuel, notes)
             low_image, high_image = low, high
             if not (is_clear and all_zero(state, code, at + stride)):
                 side_low = load_codes(state, code, at - stride)
                 side_high = load_codes(state, code, at + stride)
-                low_image = _ghost(side_low == zero, low, here, side_low)
-                high_image = _ghost(side_high == zero, high, here, side_high)
+                low_image = ghost(side_low == zero, low, here, side_low)
+                high_image = ghost(side_high == zero, high, here, side_high)
             ratio_here = fill(state, ratio * get(narrow, m))
-            below, above = _at_faces(state, low_image, here, high_image, per_r, ratio_here, fuel)
+            below, above = at_faces(state, low_image, here, high_image, per_r, ratio_here, fuel)
         left, right, wall = before, below, zero
         if not is_clear:
             side_left = load_codes(state, code, at - stride)
             side_right = load_codes(state, code, at)
-            left = _ghost(side_left == zero, before, below, side_left)
-            right = _ghost(side_right == zero, below, before, side_right)
+            left = ghost(side_left == zero, before, below, side_left)
+            right = ghost(side_right == zero, below, before, side_right)
             wall = side_left + side_right
-        flux = _hllc(state, left, right, wall, fuel)
+        flux = hllc(state, left, right, wall, fuel)
         _record_walls(flux[1], vectors + at // lanes_at(state), recorded, work)
         if m > first:
-            _update(state, cells, at - stride, axis, fuel, code, ratio_before, flux_before, flux)
+            update(state, cells, at - stride, axis, fuel, code, ratio_before, flux_before, flux)
         low, here, per_r, before, flux_before = here, high, per_r_high, above, flux
         ratio_before = ratio_here
         at += stride
@@ -465,18 +466,18 @@ def _sweep_along(
     """
     state, code, still, narrow, work, notes, cells = gas
     lanes = lanes_at(state)
-    air, zero, step = _still_air(state, still), fill(state, 0.0), fill(state, ratio)
+    air, zero, step = still_air(state, still), fill(state, 0.0), fill(state, ratio)
     flux_still = (zero, air[4], zero, zero, zero, zero)
     before, above_before, flux_before = air, air, flux_still
     at = begin + first * lanes
-    here, per_r = _safe_variables(state, cells, at, 0, fuel, notes)
+    here, per_r = safe_variables(state, cells, at, 0, fuel, notes)
     for m in range(first, end + 1):
         after, per_r_after, above, flux = air, per_r, air, flux_still
         if m < end:
             if measure:
-                _note_signals(state, here, per_r, work)
+                note_signals(state, here, per_r, work)
             if m + 1 < end:
-                after, per_r_after = _safe_variables(state, cells, at + lanes, 0, fuel, notes)
+                after, per_r_after = safe_variables(state, cells, at + lanes, 0, fuel, notes)
             low, high = _one_lower(before, here), _one_higher(here, after)
             is_clear = (
                 all_zero(state, code, at - 1)
@@ -487,21 +488,21 @@ def _sweep_along(
             if not is_clear:
                 side_low, side_here = load_codes(state, code, at - 1), load_codes(state, code, at)
                 side_high = load_codes(state, code, at + 1)
-                low = _ghost(side_low == zero, low, here, side_low)
-                high = _ghost(side_high == zero, high, here, side_high)
+                low = ghost(side_low == zero, low, here, side_low)
+                high = ghost(side_high == zero, high, here, side_high)
             ratio_here = step * load(narrow, m * lanes)
-            below, above = _at_faces(state, low, here, high, per_r, ratio_here, fuel)
+            below, above = at_faces(state, low, here, high, per_r, ratio_here, fuel)
             left, right = _one_lower(above_before, above), below
             if not is_clear:
                 left, right = (
-                    _ghost(side_low == zero, left, right, side_low),
-                    _ghost(side_here == zero, right, left, side_here),
+                    ghost(side_low == zero, left, right, side_low),
+                    ghost(side_here == zero, right, left, side_here),
                 )
-            flux = _hllc(state, left, right, side_low + side_here, fuel)
+            flux = hllc(state, left, right, side_low + side_here, fuel)
             _record_walls(flux[1], at // lanes, recorded, work)
         if m > first:
             ratio_before = step * load(narrow, (m - 1) * lanes)
-            _update(
+            update(
                 state, cells, at - lanes, 0, fuel, code, ratio_before, flux_before,
                 _one_higher(flux_before, flux),
             )  # fmt: skip

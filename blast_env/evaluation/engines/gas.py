@@ -42,6 +42,7 @@ from blast_env.evaluation.validation import (
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
 from blast_env.gas.settings import (
+    ADAPTIVE_CELL_M,
     FACE_NAMES,
     GasSettings,
     distance_unchecked,
@@ -179,7 +180,9 @@ class GasEngine(GasSettings, Engine):
         modules = MODULE_SIDE_M / cell_m
         if modules < 1.0 - 1e-9 or abs(modules - round(modules)) > 1e-9:
             return None
-        return replace(self, cell_m=cell_m, cells="coarse" if self.is_growing else self.cells)
+        if self.is_growing or (self.is_adaptive and cell_m > ADAPTIVE_CELL_M + 1e-9):
+            return replace(self, cell_m=cell_m, cells="coarse")
+        return replace(self, cell_m=cell_m)
 
     @property
     def words(self) -> str:
