@@ -16,6 +16,10 @@ from blast_env.gas.settings import GasSettings
 from blast_env.geometry import Rectangle
 from blast_env.site.blast_site import BlastSite
 
+DETOUR: Final = 1.2
+"""Longest way of a front that adaptive cells follow to a structure, over the way to its farthest
+corner."""
+
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0
 """Limits on the memory and the core time of a blast; costlier ones are refused."""
@@ -34,13 +38,14 @@ _PARTS: Final = 100
 """Number of intervals of a run in which updated cells are counted."""
 
 _CELLS_PER_S: Final = 35e6
-_ADAPTIVE_CELLS_PER_S: Final = 12e6
-_BLOCKS_ALONG: Final = 2.0
-_BLOCKS_AT_WALLS: Final = 1.0
-"""Thickness of small cells along a front and at walls, in blocks; fitted to blasts on the bundled
-sites."""
+_ADAPTIVE_CELLS_PER_S: Final = 11e6
+_FRONT_CELLS: Final = 1.5e9
+_FRONT_POWER: Final = 0.7
+"""Updates of cells along fronts of ten cells' thickness at which as many are made, and the power
+with which they grow; both are fitted to blasts on the bundled sites."""
 _BYTES_PER_CELL: Final = 28.0
-_ADAPTIVE_BYTES_PER_CELL: Final = 10.0
+_ADAPTIVE_BYTES: Final = 300e6
+_ADAPTIVE_BYTES_PER_CELL: Final = 12.0
 _PROCESS_BYTES: Final = 270e6
 _DRAWING_S: Final = 2.5
 
@@ -132,9 +137,11 @@ def _cost_of_adaptive(
 ) -> CostGuess:
     """Return the estimated cost of a blast on adaptive cells.
 
-    1. Cells of the largest size are those behind the front.
-    2. Blocks of smaller cells lie along the front, within the site, and those of the second size
-       along walls, too.
+    1. Cells of the largest size are those behind the front, in whole blocks.
+    2. Those of the second size are before walls that the front has passed.
+    3. Smaller ones are along fronts where these are followed. Fronts meet, and the longer they are
+       the smaller is the part that is followed: the number of cells grows with a power of their
+       area.
 
     Args:
         settings: The settings of the run.
@@ -145,28 +152,34 @@ def _cost_of_adaptive(
     sides_m = width_m, depth_m, height_m = _sides_m(site)
     count = settings.levels
     largest_m = settings.smallest_m * 2.0 ** (count - 1)
-    around_m = 2.0 * (settings.margin_m + settings.border_m / 4.0)
+    second_m, block_m = 0.5 * largest_m, 8.0 * largest_m
+    most_m = (
+        width_m + 2.0 * (settings.margin_m + block_m),
+        depth_m + 2.0 * (settings.margin_m + block_m),
+        height_m + block_m,
+    )
     walls_m2 = sum(_walls_m2(each.rectangle_m, each.height_m) for each in site.structures)
-    steps, moved = 0.0, 0.0
+    watched = watched_structures(site, settings.until)
+    reach_m = DETOUR * SOUND_M_S * sound_s(site, corners_m(site, watched))
+    steps = large = at_walls = along = 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
         front_m = _front_m(now_s, scale)
         step_s = settings.smallest_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
-        steps += part_s / step_s
-        behind = min(width_m + around_m, 2.0 * front_m) * min(depth_m + around_m, 2.0 * front_m)
-        behind *= min(height_m + 0.5 * around_m, front_m)
+        own_steps = part_s / step_s
+        steps += own_steps
+        x_m, y_m = (min(each, 2.0 * (front_m + block_m)) for each in most_m[:2])
+        z_m = min(most_m[2], front_m + block_m)
+        large += own_steps / 2.0 ** (count - 1) * x_m * y_m * z_m / largest_m**3
         passed = min(2.0 * front_m / max(width_m, depth_m), 1.0)
-        along_m2 = min(2.0 * pi * front_m, width_m + depth_m) * min(front_m, height_m)
-        for level in range(count):
-            cell_m = largest_m / 2.0**level
-            volume = behind if level == 0 else _BLOCKS_ALONG * 8.0 * cell_m * along_m2
-            if level == 1:
-                volume += _BLOCKS_AT_WALLS * 8.0 * cell_m * walls_m2 * passed
-            own_steps = part_s / step_s / 2.0 ** (count - 1 - level)
-            moved += own_steps * min(volume, behind) / cell_m**3
+        at_walls += own_steps / 2.0 ** (count - 2) * passed * walls_m2 * 8.0 / second_m**2
+        length_m = min(2.0 * pi * front_m, width_m + depth_m, 2.0 * reach_m)
+        area_m2 = length_m * min(front_m, height_m)
+        along += own_steps * 10.0 * area_m2 / settings.smallest_m**2
+    fronts = _FRONT_CELLS * (along / _FRONT_CELLS) ** _FRONT_POWER
     cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
-    memory = _PROCESS_BYTES + _ADAPTIVE_BYTES_PER_CELL * cells
-    return CostGuess(cells, ceil(steps), memory, moved, _ADAPTIVE_CELLS_PER_S)
+    memory = _ADAPTIVE_BYTES + _ADAPTIVE_BYTES_PER_CELL * cells
+    return CostGuess(cells, ceil(steps), memory, large + at_walls + fronts, _ADAPTIVE_CELLS_PER_S)
 
 
 def _walls_m2(rectangle_m: Rectangle, height_m: float | None) -> float:

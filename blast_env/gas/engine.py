@@ -21,7 +21,7 @@ from blast_env.compilation import compilation_notice
 from blast_env.errors import BlastEnvError
 from blast_env.gas.block_map import layers_around, shape_of_blocks
 from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
-from blast_env.gas.cost import cost_of_run
+from blast_env.gas.cost import DETOUR, cost_of_run
 from blast_env.gas.enclosure import room_around
 from blast_env.gas.ending import (
     AREA,
@@ -55,9 +55,7 @@ if TYPE_CHECKING:
     from blast_env.site.footprint import Footprint
 
 _HOTTEST: Final = 4.0  # temperature limit of settled products, in units of still air's
-_DETOUR: Final = 1.2
-_NEAR_M: Final = 4.0
-"""Longest way of a front that is followed, over the way to the farthest corner, and more, m."""
+_NEAR_M: Final = 4.0  # longer than `DETOUR` allows, for blocks in part within it
 
 _LOOK_EVERY: Final = 4  # steps between two checks of the loads
 
@@ -311,7 +309,7 @@ def _reaches_early(
         corners = [(x, y) for x in (left, right) for y in (bottom, top)]
         farthest_m = max(np.hypot(x - from_x, y - from_y) for x, y in corners)
         way_m = there_m + np.hypot(beside_m, before_m)
-        early |= way_m <= _DETOUR * farthest_m + _NEAR_M
+        early |= way_m <= DETOUR * farthest_m + _NEAR_M
     return early
 
 

@@ -167,6 +167,15 @@ def test_small_cells_are_where_the_front_is() -> None:
     assert small < 8 * middle < 64 * large
 
 
+def test_fronts_have_small_cells_only_where_they_are_followed() -> None:
+    """The thin wall needs small cells; the front has them nowhere else, and peaks fall."""
+    wide = refined(3)
+    none = run(3, followed=lambda x_m, y_m: np.zeros(np.broadcast(x_m, y_m).shape, dtype=bool))
+    assert none.gas.blocks()[2] < wide.gas.blocks()[2]
+    assert none.gas.cell_updates < 0.8 * wide.gas.cell_updates
+    assert none.loads.peak_pa.mean() < 0.98 * wide.loads.peak_pa.mean()
+
+
 def test_the_grid_consists_of_whole_blocks() -> None:
     assert shape_of_blocks((17, 16, 1), 3) == (32, 16, 16)
     grid = GasGrid(CELL_M, np.zeros((16, 16, 20), dtype=bool))
