@@ -263,7 +263,7 @@ def refinement(
     ] = None,
     sizes: Annotated[
         str, typer.Option(help="Cells to compare, the reference last: names, or sides in m.")
-    ] = "coarse,fine,adaptive,0.25",
+    ] = "fine,adaptive,0.25",
 ) -> None:
     """Print loads, cost and memory of choices of cells, over those of the last one."""
     with user_errors():
