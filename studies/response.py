@@ -295,16 +295,20 @@ RAISED_KG: Final = 20.0
 def raised_rows(distance_m: float, heights_m: Sequence[float], cell_m: float) -> Iterator[Row]:
     """Yield one row per height of a charge: impulse and peak of a wall by gas and by screening.
 
-    They are those of the lowest bay before the charge, peaks over those of a charge on the ground.
+    They are those of the lowest bay before the charge, peaks over those of a charge on the ground;
+    the last column has the largest ratio of impulses of all bays.
     """
     first: tuple[float, float] | None = None
     for height_m in heights_m:
         site = open_wall(distance_m, 12.0, 7.0, RAISED_KG, height_m)
         loads = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().bay_loads
-        bay = screen(site).threats[0].bays[1]
-        index = [bay.bay.name for bay in loads.bays].index(bay.filled.bay.name)
+        screened = screen(site).threats[0].bays
         time_s, pressure_pa = loads.histories
-        gas_pa_s = float(impulses(time_s, pressure_pa[index : index + 1]).max())
+        names = [own.bay.name for own in loads.bays]
+        by_gas = dict(zip(names, impulses(time_s, pressure_pa).max(axis=1).tolist(), strict=True))
+        bay = screened[1]
+        index, gas_pa_s = names.index(bay.filled.bay.name), by_gas[bay.filled.bay.name]
+        largest = max(by_gas[own.filled.bay.name] / own.impulse_pa_s for own in screened)
         peaks = float(pressure_pa[index].max()), bay.peak_pa
         first = peaks if first is None else first
         yield (
@@ -315,6 +319,7 @@ def raised_rows(distance_m: float, heights_m: Sequence[float], cell_m: float) ->
             f"{gas_pa_s / bay.impulse_pa_s:.2f}",
             f"{peaks[0] / first[0]:.2f}",
             f"{peaks[1] / first[1]:.2f}",
+            f"{largest:.2f}",
         )
 
 
@@ -402,8 +407,8 @@ def raised(
     with user_errors():
         at_m, up_m = ([float(word) for word in text.split(",")] for text in (distances, heights))
         headers = ("wall at", "charge at", "gas, Pa s", "screening, Pa s", "gas over screening")
-        peaks = ("peak over that on the ground, gas", "screening")
-        rows = [row for coordinate_m in at_m for row in raised_rows(coordinate_m, up_m, cell)]
+        peaks = ("peak over that on the ground, gas", "screening", "impulses, worst bay")
+        rows = [row for away_m in at_m for row in raised_rows(away_m, up_m, cell)]
         print_line(markdown_table((*headers, *peaks), rows))
 
 

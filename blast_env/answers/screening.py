@@ -4,7 +4,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from blast_env.answers.document import AnyPart, Line, Table
-from blast_env.evaluation.questions.screening import LEFT_OUT, Screening, ThreatScreening
+from blast_env.evaluation.questions.screening import (
+    LEFT_OUT,
+    LOW_BY,
+    RAISED_SCALED_M,
+    Screening,
+    ThreatScreening,
+)
 from blast_env.evaluation.questions.verdict import Consequences, Verdict
 from blast_env.geometry import Layout, layout_counts
 from blast_env.response.buildings import LevelOfProtection
@@ -51,6 +57,9 @@ def screening_answer(
     title = f"{scenario.name}, {behind}: worst place by damage"
     yield Table.of(title, _THREATS, rows, 2)
     for threat in found.threats:
+        if threat.may_be_low:
+            yield Line.of(_low_words(threat), kind="flag")
+    for threat in found.threats:
         title = (
             f"stand-off (m) from which a component allows a level, {threat.name},"
             f" {threat.charge.tnt_kg:g} kg TNT (* on this site)"
@@ -73,6 +82,15 @@ def _threat_row(
         found.stand_offs[threat.name][0].in_words(needed_m),
         *threat.words,
         Verdict.of(kept).word().lower() + threat.doubts(required),
+    )
+
+
+def _low_words(threat: ThreatScreening) -> str:
+    return (
+        f"{threat.name}: loads may be low: {threat.charge.tnt_kg:g} kg TNT is"
+        f" {threat.charge.height_m:g} m above the ground and {threat.nearest_m:.1f} m from a bay,"
+        f" {threat.scaled_m:.1f} m/kg^(1/3); nearer than {RAISED_SCALED_M:g}, gas has up to"
+        f" {LOW_BY:g} times screening's impulse: a blast by gas decides"
     )
 
 

@@ -122,6 +122,9 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.response angles": "--width 12",
     "python -m studies.response peaks": "--cell 0.5",
     "python -m studies.response raised": "--cell 0.5 --distances 10 --heights 0,1.1",
+    "python -m studies.response raised --cell 0.25 --distances 5,6.5,8 --heights 0,0.2,2,3,4,5": (
+        "--cell 0.5 --distances 8 --heights 0,0.2"
+    ),
     # docs/researchers/training.md
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md

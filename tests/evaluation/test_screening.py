@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blast_env.answers.document import Line
+from blast_env.answers.screening import screening_answer
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
@@ -113,6 +115,22 @@ def test_a_component_keeps_its_level_from_its_stand_off_on() -> None:
         for share in (0.97, 1.0)
     ]
     assert levels[0] < LevelOfProtection.LOW <= levels[1]
+
+
+def test_a_charge_above_the_ground_near_a_wall_says_that_gas_may_have_more() -> None:
+    """20 kg 5 m from a wall: 1.8 m/kg^(1/3); at 12 m 4.4, on the ground screening is the larger."""
+    for away_m, up_m, may_be_low in ((5.0, 0.2, True), (5.0, 0.0, False), (12.0, 0.2, False)):
+        site = yard(position_m=[30.0 - away_m, 20.0], tnt_kg=20.0, height_m=up_m)
+        found = screen(site)
+        assert found.threats[0].may_be_low is may_be_low
+        required = [Requirement.parsed("low")]
+        parts = screening_answer(site, (), found, required)
+        answer = " ".join(part.text() for part in parts if isinstance(part, Line))
+        assert (f"{up_m:g} m above the ground and " in answer) is may_be_low
+        assert ("gas has up to" in answer) is may_be_low
+        assert ("loads may be low" in found.threats[0].doubts(required)) is may_be_low
+        least_m = found.stand_offs[found.threats[0].name][0].least_m
+        assert least_m == pytest.approx((2.9 if up_m else 1.7) * 20.0 ** (1 / 3))
 
 
 def reflected(distance_m: float) -> tuple[float, float]:

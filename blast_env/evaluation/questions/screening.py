@@ -5,7 +5,8 @@ bay in sight of the charge has the peak and the impulse of its middle by the ang
 out of sight the side-on values of the same distance. The history is a triangle.
 
 Stand-offs are for normal incidence. They end at both limits of validity: nearer than
-1.7 m/kg^(1/3) walls may be breached, and the curves end at 40 m/kg^(1/3).
+1.7 m/kg^(1/3) walls may be breached, and the curves end at 40 m/kg^(1/3). Those of a charge above
+the ground end at 2.9 m/kg^(1/3): nearer, gas dynamics can have more than screening.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -51,6 +52,14 @@ LEFT_OUT: Final = (
 """What screening does not know."""
 
 _LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
+RAISED_SCALED_M: Final = 2.9
+"""Scaled distance, m/kg^(1/3), nearer than which loads of charges above the ground are flagged."""
+
+LOW_BY: Final = 1.02
+"""Largest impulse of gas over screening's there, down to 1.8 m/kg^(1/3), for charges above the
+ground (`python -m studies.response raised --cell 0.25 --distances 5,6.5,8 --heights
+0,0.2,2,3,4,5`)."""
+
 _APART_M: Final = 2.0
 _MOST_PLACES: Final = 300
 _POINTS: Final = 14  # of a table of damage, along each axis
@@ -107,7 +116,17 @@ class ThreatScreening:
     @property
     def may_breach(self) -> bool:
         """Whether a bay is so near that its wall may be breached."""
-        return bool(self.nearest_m < CHECKED_SCALED_DISTANCE[0] * np.cbrt(self.charge.tnt_kg))
+        return self.scaled_m < CHECKED_SCALED_DISTANCE[0]
+
+    @property
+    def scaled_m(self) -> float:
+        """Scaled distance of the nearest bay's middle, m/kg^(1/3)."""
+        return self.nearest_m / float(np.cbrt(self.charge.tnt_kg))
+
+    @property
+    def may_be_low(self) -> bool:
+        """Whether gas may have more: the charge is above the ground, and a bay is near."""
+        return self.charge.height_m > 0.0 and self.scaled_m < RAISED_SCALED_M
 
     def doubts(self, required: Sequence[Requirement]) -> str:
         """Return the conditions of a verdict on requirements, in brackets; empty without any."""
@@ -117,7 +136,8 @@ class ThreatScreening:
             for requirement in required
             if requirement.level
         )
-        doubts = ["may be breached"] * self.may_breach + ["rests on assumptions"] * rests
+        doubts = ["may be breached"] * self.may_breach + ["loads may be low"] * self.may_be_low
+        doubts += ["rests on assumptions"] * rests
         return f" ({', '.join(doubts)})" if doubts else ""
 
     def keeps(self, requirement: Requirement) -> bool:
@@ -134,23 +154,20 @@ class StandOff:
         component: The component.
         distances_m: Distance by level; infinite beyond the end of the curves.
         least_m: Least distance for which the response is valid; a distance equal to it may be less.
+        most_m: Distance of the end of the curves.
     """
 
     name: str
     component: Glazing | Wall
     distances_m: Mapping[LevelOfProtection, float]
     least_m: float
+    most_m: float
 
     def in_words(self, distance_m: float) -> str:
         """Return a distance in words, m, with the limits of validity."""
         if np.isinf(distance_m):
             return f"> {self.most_m:.0f}"
         return f"< {self.least_m:.0f}" if distance_m <= self.least_m else f"{distance_m:.0f}"
-
-    @property
-    def most_m(self) -> float:
-        """Distance of the end of the curves."""
-        return self.least_m * CURVES_SCALED_M[1] / CHECKED_SCALED_DISTANCE[0]
 
 
 @dataclass(frozen=True)
@@ -257,7 +274,7 @@ def stand_offs(
     for name, component in components.items():
         part = component.panel(storey_m) if isinstance(component, Wall) else component.pane
         distances_m = {level: curves.stand_off_m(part, level) for level in _LEVELS}
-        found.append(StandOff(name, component, distances_m, curves.least_m))
+        found.append(StandOff(name, component, distances_m, curves.least_m, curves.most_m))
     return tuple(found)
 
 
@@ -267,7 +284,8 @@ class _Curves:
     def __init__(self, charge: Charge) -> None:
         self._charge = charge
         scale = float(np.cbrt(charge.tnt_kg))
-        self.least_m = CHECKED_SCALED_DISTANCE[0] * scale
+        is_raised = charge.height_m > 0.0
+        self.least_m = (RAISED_SCALED_M if is_raised else CHECKED_SCALED_DISTANCE[0]) * scale
         self.most_m = CURVES_SCALED_M[1] * scale
 
     @cached_property
