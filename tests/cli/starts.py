@@ -17,7 +17,8 @@ from itertools import groupby
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-DENSITY = 6
+DENSITIES = (6, 2)  # until there are `EARLY` copies, and then
+EARLY = 22
 MOST_S = 120
 
 
@@ -65,7 +66,8 @@ class Interrupter:
         self._events += 1
         if self._events < self._next:
             return
-        self._next = self._events + 1 + self._events // DENSITY
+        density = DENSITIES[self._copies >= EARLY]
+        self._next = self._events + 1 + self._events // density
         self._copies += 1
         command, self.command = self.command, ""
         number = SIGNALS[self._copies % len(SIGNALS)]

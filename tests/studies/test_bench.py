@@ -48,17 +48,21 @@ def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.Monk
     assert "steam" in refused.output
 
 
+ENGINE = GasEngine(cell_m=0.5)
+
+
 @pytest.fixture(scope="module")
 def cost() -> SiteCost:
-    return site_cost(street(20.0), GasEngine())
+    return site_cost(street(20.0), ENGINE)
 
 
 def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told(cost: SiteCost) -> None:
-    engine, scenario = GasEngine(), street(20.0)
+    scenario = street(20.0)
     assert (cost.site, cost.cells) == ("street_20_m", "uniform")
-    assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
+    assert cost.cell_updates > 1000 * cost.steps
+    assert cost.cpu_s > 0.0
     assert 100.0 < cost.memory_mb < 1000.0
-    assert cost.estimate == engine.cost(scenario, draw_charge(scenario, 0))
+    assert cost.estimate == ENGINE.cost(scenario, draw_charge(scenario, 0))
     assert 0.5 < cost.estimate.steps / cost.steps < 2.0
 
 
