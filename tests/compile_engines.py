@@ -28,7 +28,7 @@ from blast_env.gas import (
 )
 from blast_env.layout import draw_charge
 from blast_env.site import Scenario
-from blast_env.surrogate import SurrogateEngine, Ways, relations
+from blast_env.surrogate import SurrogateEngine, Ways, solid_relations
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
@@ -84,7 +84,7 @@ def surrogate() -> None:
     piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
     points = np.array([[9.0, 0.0, 1.0]])
     Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
-    relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
+    solid_relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
     envs = BlastBarrierVectorEnv(
         2, scenario="control_room", engine=SurrogateEngine(), observation="features"
     )

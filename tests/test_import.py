@@ -42,6 +42,23 @@ def test_guesses_need_no_torch() -> None:
     assert not {"torch", "pandas"} & modules
 
 
+def test_no_name_of_a_room_is_that_of_a_file_beside_it() -> None:
+    """Importing the file would put it in the place of a name that comes on first use."""
+    root = Path(blast_env.__file__).parent
+    for room in root.rglob("__init__.py"):
+        text = room.read_text(encoding="utf-8")
+        if "on_first_use(__name__)" in text:
+            lazy = [
+                node
+                for part in ast.parse(text).body
+                if isinstance(part, ast.If)
+                for node in part.body
+            ]
+            imports = [node for node in lazy if isinstance(node, ast.ImportFrom)]
+            names = {alias.name for node in imports for alias in node.names}
+            assert names.isdisjoint(file.stem for file in room.parent.iterdir()), room
+
+
 @pytest.mark.parametrize("name", blast_env.__all__)
 def test_every_public_name_is_there(name: str) -> None:
     assert getattr(blast_env, name) is not None

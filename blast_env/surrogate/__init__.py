@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         load_surrogate,
         packaged_surrogate,
     )
-    from blast_env.surrogate.relations import relations
+    from blast_env.surrogate.relations import solid_relations
     from blast_env.surrogate.walls import FEATURES, INPUTS, SurrogateSite, WallPoints, site_of
     from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 else:
@@ -66,7 +66,7 @@ __all__ = [
     "load_errors",
     "load_surrogate",
     "packaged_surrogate",
-    "relations",
     "site_of",
+    "solid_relations",
     "stacked",
 ]

@@ -26,7 +26,7 @@ _MOST: Final = 6.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def relations(
+def solid_relations(
     start_m: FloatArray,
     points_m: FloatArray,
     outward: FloatArray,

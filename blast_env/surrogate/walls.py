@@ -18,7 +18,7 @@ from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.facade import BayComponents
 from blast_env.site.terraces import ground_below_m, is_open_below
 from blast_env.surrogate.pieces import Box, Memory
-from blast_env.surrogate.relations import RELATIONS, relations
+from blast_env.surrogate.relations import RELATIONS, solid_relations
 from blast_env.surrogate.ways import SHARES, Ways
 from blast_env.units import MODULE_SIDE_M
 
@@ -173,7 +173,7 @@ class Approach:
             barrier: As for `features`.
         """
         ways = self.ways
-        found: FloatArray = relations(
+        found: FloatArray = solid_relations(
             ways.start_m, ways.points_m, self.outward, self.scale_m, barrier
         )
         return found
@@ -327,7 +327,7 @@ class SurrogateSite:
             outward=points.outward,
             scale_m=scale,
             on_empty=np.hstack((geometry, shares, shares)),
-            solids=relations(start_m, ways.points_m, points.outward, scale, self._solids),
+            solids=solid_relations(start_m, ways.points_m, points.outward, scale, self._solids),
             log_impulse=np.log(impulse),
             log_peak=np.log(peak),
             area_m2=points.area_m2,

@@ -57,8 +57,8 @@ from blast_env.surrogate import (
     load_errors,
     load_surrogate,
     packaged_surrogate,
-    relations,
     site_of,
+    solid_relations,
 )
 from studies.blast_table import COLUMNS
 from studies.surrogate import Holdout, Recipe, verdict
@@ -230,7 +230,7 @@ OUTWARD = np.array([[-0.6, 0.8]])
 def related(*solids: list[float], **changes: np.ndarray) -> np.ndarray:
     """Where solids stand for a point (solids, RELATIONS), with lengths in m."""
     where = {"start_m": CHARGE_M, "points_m": POINT_M, "outward": OUTWARD} | changes
-    return relations(**where, scale_m=1.0, solids=np.array(solids).reshape(-1, 5))[:, 0]
+    return solid_relations(**where, scale_m=1.0, solids=np.array(solids).reshape(-1, 5))[:, 0]
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
