@@ -28,7 +28,7 @@ from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.fitting import elements
 from blast_env.tables import table_of
-from studies.blast_table import COLUMNS, load_row, scenario_of
+from studies.blast_table import COLUMNS, load_row, named, scenario_of
 
 
 class SiteBlasts(NamedTuple):
@@ -73,14 +73,11 @@ def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[st
     """Run the blasts of a site that are missing in the folder; return the rows of all blasts."""
     site, engine = scenario_of(asked.name), find_engine("gas", cells=cells)
     evaluator = BlastEvaluator(site, engine, cache=folder)
-    rows = []
+    names, rows = dict([named(asked.name, site)]), []
     for layout, charge in asked.blasts:
         threat = LoadCase(charge, 0)
         loads, key = evaluator.loads(layout, threat), evaluator.key(layout, threat)
-        rows += [
-            load_row({key.scenario_hash: asked.name}, key, structure)
-            for structure in loads.structures
-        ]
+        rows += [load_row(names, key, structure) for structure in loads.structures]
     return rows
 
 

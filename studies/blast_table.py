@@ -6,8 +6,9 @@ of the code invalidates the cache.
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 import typer
@@ -144,11 +145,11 @@ def main(
     """Write the table, each blast once."""
     with user_errors():
         known = (*bundled_scenarios(), *(scenario or ()))
-        names = {load_scenario(name).content_hash: name for name in known}
+        names = dict(named(name, load_scenario(name)) for name in known)
         for side_m in (None, *(side or ())):
             for seed in range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites):
                 name = site_name(seed, side_m, front=front)
-                names[scenario_of(name).content_hash] = name
+                names.update([named(name, scenario_of(name))])
         rows: dict[str, list[dict[str, object]]] = {}
         for folder in folders:
             if not folder.is_dir():
@@ -165,12 +166,38 @@ def main(
     print_line(f"{len(rows):,} blasts; wrote {out}")
 
 
-def load_row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:
-    """Return the row of a structure under a blast; `names` are those of scenarios, by hash."""
+class NamedSite(NamedTuple):
+    """A scenario of the table.
+
+    Attributes:
+        name: Its name.
+        content_hash: Its content hash, with its budget; the key of a blast is without.
+    """
+
+    name: str
+    content_hash: str
+
+
+def named(name: str, site: Scenario) -> tuple[str, NamedSite]:
+    """Return the hash in the keys of a site's blasts, and the site as the table names it."""
+    return site.without_budget.content_hash, NamedSite(name, site.content_hash)
+
+
+def load_row(
+    names: Mapping[str, NamedSite], key: BlastKey, load: StructureLoad
+) -> dict[str, object]:
+    """Return the row of a structure under a blast.
+
+    Args:
+        names: Scenarios by the hash in the keys of their blasts; others have no name.
+        key: The blast.
+        load: Its load on the structure.
+    """
+    site = names.get(key.scenario_hash, NamedSite("", key.scenario_hash))
     x_m, y_m = key.charge.position_m
     return {
-        "scenario": names.get(key.scenario_hash, ""),
-        "scenario_hash": key.scenario_hash,
+        "scenario": site.name,
+        "scenario_hash": site.content_hash,
         "layout": json.dumps(key.layout),
         "charge_x_m": x_m,
         "charge_y_m": y_m,

@@ -8,10 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray, IntArray
+from blast_env.arrays import FloatArray
 from blast_env.envs.observable import (
     Array,
     BatchedObservation,
@@ -132,6 +131,8 @@ class FeaturesEpisode(BatchedObservation):
     @staticmethod
     def observe_many(episodes: Sequence["FeaturesEpisode"], placements: Placements) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
+        from blast_env.envs.observation_kernels import put_vectors  # Numba takes long to import
+
         shares, has_items = stock_shares(placements), placements.rules[0].catalogue.has_items
         if has_items:
             shares = np.hstack((shares, items_left(placements)))
@@ -150,70 +151,12 @@ class FeaturesEpisode(BatchedObservation):
             length += (2 + kinds) * rows * columns
         shows_vehicles = episodes[0].shows_vehicles
         vectors = np.empty((len(episodes), length + shows_vehicles), dtype=np.float32)
-        _put_vectors(own, constants, variants, shares, legal, occupancy, has_items, vectors)
+        of_episodes = own, constants, variants, shares, legal, occupancy, has_items
+        put_vectors(*of_episodes, _SHARES, _SITE, vectors)
         if shows_vehicles:
             stand_offs = _stand_offs([episode.vehicles for episode in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
         return vectors
-
-
-@njit(cache=True, nogil=True)
-def _put_vectors(
-    own: IntArray,
-    constants: Plane,
-    variants: Plane,
-    shares: FloatArray,
-    legal: NDArray[np.uint8],
-    occupancy: NDArray[np.uint8],
-    has_items: bool,  # Numba has no keywords only
-    vectors: Plane,
-) -> None:
-    """Put the values of episodes into their vectors, all but the stand-off.
-
-    Args:
-        own: Number of the constants of each episode (episodes,).
-        constants: See `FeaturesEpisode` (numbers, n).
-        variants: See `FeaturesEpisode` (numbers, 2, variants + 1).
-        shares: Shares of stock, budget and items (episodes, 3 + items).
-        legal: 1 where each variant may be placed (episodes, variants, cells).
-        occupancy: Number of the variant on each cell (episodes, cells).
-        has_items: Whether there is a catalogue.
-        vectors: The vectors (episodes, features).
-    """
-    _, kinds, cells = legal.shape
-    items = shares.shape[1] - _SHARES
-    for episode in range(len(vectors)):
-        vector, known = vectors[episode], constants[own[episode]]
-        for index in range(_SHARES):
-            vector[index] = min(max(shares[episode, index], 0.0), 1.0)
-        at = _SHARES
-        vector[at : at + _SITE] = known[:_SITE]
-        at += _SITE
-        stands, is_free = vector[at : at + cells], vector[at + cells : at + 2 * cells]
-        for cell in range(cells):
-            stands[cell] = min(occupancy[episode, cell], 1)
-            is_free[cell] = legal[episode, 0, cell]
-        for kind in range(1, kinds):
-            for cell in range(cells):
-                is_free[cell] = max(is_free[cell], np.float32(legal[episode, kind, cell]))
-        at += 2 * cells
-        vector[at : at + len(known) - _SITE] = known[_SITE:]
-        at += len(known) - _SITE
-        if has_items:
-            for index in range(items):
-                vector[at + index] = min(max(shares[episode, _SHARES + index], 0.0), 1.0)
-            at += items
-            heights, stops = vector[at : at + cells], vector[at + cells : at + 2 * cells]
-            of_variants = variants[own[episode]]
-            for cell in range(cells):
-                heights[cell] = of_variants[0, occupancy[episode, cell]]
-                stops[cell] = of_variants[1, occupancy[episode, cell]]
-            at += 2 * cells
-            for kind in range(kinds):
-                places = vector[at : at + cells]
-                for cell in range(cells):
-                    places[cell] = legal[episode, kind, cell]
-                at += cells
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:

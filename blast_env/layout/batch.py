@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from math import fsum
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
@@ -136,6 +135,8 @@ class LayoutBatch:
             indices: The layouts, different ones.
             numbers: The number of the element in the catalogue, for each.
         """
+        from blast_env.layout.batch_kernels import find_full, place  # Numba takes long to import
+
         if not indices:
             return
         of_rules: dict[int, list[int]] = {}
@@ -148,11 +149,11 @@ class LayoutBatch:
                 self._spent[index].append(rules.cost(number))
         chosen = np.array(indices)
         arrays = self.legal, self.occupancy, self.table, self.left
-        _place(chosen, np.array(numbers), self.rules[indices[0]].variants, *arrays)
+        place(chosen, np.array(numbers), self.rules[indices[0]].variants, *arrays)
         for own in of_rules.values():
             self._limit_to_budget(own)
             self._keep_open(own)
-        _find_full(chosen, self.legal, self.is_full)
+        find_full(chosen, self.legal, self.is_full)
 
     def _limit_to_budget(self, indices: Sequence[int]) -> None:
         """Take away places beyond the budget, in layouts of the same rules."""
@@ -164,7 +165,9 @@ class LayoutBatch:
         spendable = rules.zone.cost_limit - spent
         short = spendable < rules.dearest
         if short.any():
-            _limit(np.array(indices)[short], spendable[short], rules.costs, self.legal)
+            from blast_env.layout.batch_kernels import limit  # as in `place`
+
+            limit(np.array(indices)[short], spendable[short], rules.costs, self.legal)
 
     def _keep_open(self, indices: Sequence[int]) -> None:
         """Take away places that would close the access way, in layouts of the same rules."""
@@ -209,55 +212,6 @@ class LayoutBatch:
             [self.layouts[index] for index in chosen],
             *(legal, self.occupancy[rows], self.left[rows], self.budget_left[rows]),
         )
-
-
-@njit(cache=True, nogil=True)
-def _place(
-    indices: IntArray,
-    numbers: IntArray,
-    variants: IntArray,
-    legal: BoolArray,
-    occupancy: NDArray[np.uint8],
-    table: NDArray[np.int8],
-    left: IntArray,
-) -> None:
-    """Place an element in each of some layouts; arrays as in `PlacementRules`, `LayoutBatch`."""
-    _, count, rows, columns = legal.shape
-    for index, number in zip(indices, numbers):  # noqa: B905  # not known to Numba
-        variant, cell = number // (rows * columns), number % (rows * columns)
-        row, column = cell // columns, cell % columns
-        high, wide, item = variants[variant]
-        table[index, variant, row, column] = 1
-        occupancy[index, row : row + high, column : column + wide] = variant + 1
-        left[index, 0] -= 1
-        left[index, 1 + item] -= 1
-        for other in range(count):
-            if left[index, 0] == 0 or (
-                left[index, 1 + item] == 0 and variants[other, 2] == item
-            ):  # used up
-                legal[index, other] = False
-                continue
-            up, right = variants[other, 0] - 1, variants[other, 1] - 1
-            if high == 0 or up < 0:  # a measure covers no cell
-                continue
-            bottom, start = max(row - up, 0), max(column - right, 0)
-            legal[index, other, bottom : row + high, start : column + wide] = False
-
-
-@njit(cache=True, nogil=True)
-def _limit(indices: IntArray, spendable: FloatArray, costs: FloatArray, legal: BoolArray) -> None:
-    """Take away places that cost more than what may be spent (indices,)."""
-    for position, index in enumerate(indices):
-        own, most = legal[index].reshape(-1), spendable[position]
-        for place, cost in enumerate(costs.reshape(-1)):
-            own[place] &= cost <= most
-
-
-@njit(cache=True, nogil=True)
-def _find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
-    """Find whether each of some layouts has no legal place left."""
-    for index in indices:
-        is_full[index] = not legal[index].any()
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,7 @@ def published_layouts(definition: Definition, published: BlastStore) -> Iterator
         return
     blasted: dict[Layout, set[Charge]] = defaultdict(set)
     for key, _ in published.items():  # noqa: PERF102  # is no dictionary
-        if key.scenario_hash == definition.scenario.content_hash:
+        if key.scenario_hash == definition.scenario.without_budget.content_hash:
             blasted[key.layout].add(key.charge)
     for layout, own in blasted.items():
         if layout and own.issuperset(charges):

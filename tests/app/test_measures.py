@@ -79,7 +79,7 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     assert after.level_of_protection == words != before.level_of_protection
     likely = before.its_probability
     assert likely == "\N{EN DASH}" or 0.0 < float(likely.split()[-1]) <= 1.0
-    assert after.standing_of_the_load.startswith("approximate (3.4 cells per m/kg^(1/3)")
+    assert after.validation_of_the_load.startswith("approximate (3.4 cells per m/kg^(1/3)")
     assert after.worst_wall_panel == before.worst_wall_panel  # its walls are as they were
     assert verdict_rows(blasted)[0] == unprotected
     assert {row.cost for row in rows_of(blasted.comparison())} == {"0", "70"}

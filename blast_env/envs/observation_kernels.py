@@ -1,0 +1,71 @@
+"""The vectors of many episodes, compiled."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray, IntArray
+from blast_env.envs.observable import Plane
+
+
+@njit(cache=True, nogil=True)
+def put_vectors(
+    own: IntArray,
+    constants: Plane,
+    variants: Plane,
+    shares: FloatArray,
+    legal: NDArray[np.uint8],
+    occupancy: NDArray[np.uint8],
+    has_items: bool,  # Numba has no keywords only
+    first: int,
+    of_site: int,
+    vectors: Plane,
+) -> None:
+    """Put the values of episodes into their vectors, all but the stand-off.
+
+    Args:
+        own: Number of the constants of each episode (episodes,).
+        constants: See `FeaturesEpisode` (numbers, n).
+        variants: See `FeaturesEpisode` (numbers, 2, variants + 1).
+        shares: Shares of stock, budget and items (episodes, 3 + items).
+        legal: 1 where each variant may be placed (episodes, variants, cells).
+        occupancy: Number of the variant on each cell (episodes, cells).
+        has_items: Whether there is a catalogue.
+        first: Number of shares with which the vector begins.
+        of_site: Number of constants of the site, which follow.
+        vectors: The vectors (episodes, features).
+    """
+    _, kinds, cells = legal.shape
+    items = shares.shape[1] - first
+    for episode in range(len(vectors)):
+        vector, known = vectors[episode], constants[own[episode]]
+        for index in range(first):
+            vector[index] = min(max(shares[episode, index], 0.0), 1.0)
+        at = first
+        vector[at : at + of_site] = known[:of_site]
+        at += of_site
+        stands, is_free = vector[at : at + cells], vector[at + cells : at + 2 * cells]
+        for cell in range(cells):
+            stands[cell] = min(occupancy[episode, cell], 1)
+            is_free[cell] = legal[episode, 0, cell]
+        for kind in range(1, kinds):
+            for cell in range(cells):
+                is_free[cell] = max(is_free[cell], np.float32(legal[episode, kind, cell]))
+        at += 2 * cells
+        vector[at : at + len(known) - of_site] = known[of_site:]
+        at += len(known) - of_site
+        if has_items:
+            for index in range(items):
+                vector[at + index] = min(max(shares[episode, first + index], 0.0), 1.0)
+            at += items
+            heights, stops = vector[at : at + cells], vector[at + cells : at + 2 * cells]
+            of_variants = variants[own[episode]]
+            for cell in range(cells):
+                heights[cell] = of_variants[0, occupancy[episode, cell]]
+                stops[cell] = of_variants[1, occupancy[episode, cell]]
+            at += 2 * cells
+            for kind in range(kinds):
+                places = vector[at : at + cells]
+                for cell in range(cells):
+                    places[cell] = legal[episode, kind, cell]
+                at += cells

@@ -1,0 +1,56 @@
+"""Placement in many layouts at once, compiled."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def place(
+    indices: IntArray,
+    numbers: IntArray,
+    variants: IntArray,
+    legal: BoolArray,
+    occupancy: NDArray[np.uint8],
+    table: NDArray[np.int8],
+    left: IntArray,
+) -> None:
+    """Place an element in each of some layouts; arrays as in `PlacementRules`, `LayoutBatch`."""
+    _, count, rows, columns = legal.shape
+    for index, number in zip(indices, numbers):  # noqa: B905  # not known to Numba
+        variant, cell = number // (rows * columns), number % (rows * columns)
+        row, column = cell // columns, cell % columns
+        high, wide, item = variants[variant]
+        table[index, variant, row, column] = 1
+        occupancy[index, row : row + high, column : column + wide] = variant + 1
+        left[index, 0] -= 1
+        left[index, 1 + item] -= 1
+        for other in range(count):
+            if left[index, 0] == 0 or (
+                left[index, 1 + item] == 0 and variants[other, 2] == item
+            ):  # used up
+                legal[index, other] = False
+                continue
+            up, right = variants[other, 0] - 1, variants[other, 1] - 1
+            if high == 0 or up < 0:  # a measure covers no cell
+                continue
+            bottom, start = max(row - up, 0), max(column - right, 0)
+            legal[index, other, bottom : row + high, start : column + wide] = False
+
+
+@njit(cache=True, nogil=True)
+def limit(indices: IntArray, spendable: FloatArray, costs: FloatArray, legal: BoolArray) -> None:
+    """Take away places that cost more than what may be spent (indices,)."""
+    for position, index in enumerate(indices):
+        own, most = legal[index].reshape(-1), spendable[position]
+        for place, cost in enumerate(costs.reshape(-1)):
+            own[place] &= cost <= most
+
+
+@njit(cache=True, nogil=True)
+def find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
+    """Find whether each of some layouts has no legal place left."""
+    for index in indices:
+        is_full[index] = not legal[index].any()
