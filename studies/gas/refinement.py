@@ -1,5 +1,6 @@
 """Loads, cost and memory of blasts on cells of several sizes, over those of uniform cells."""
 
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from time import process_time
@@ -46,9 +47,13 @@ class CellsCompared:
 
 
 def compare_cells(scenario: Scenario, engine: GasEngine) -> CellsCompared:
-    """Run a blast in a process of its own, for its time and memory."""
-    with get_context("spawn").Pool(1) as pool:
-        return pool.apply(_compared, (scenario, engine))
+    """Run a blast in a process of its own, for its time and memory.
+
+    Raises:
+        BrokenProcessPool: If the process is killed, as for want of memory.
+    """
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(_compared, scenario, engine).result()
 
 
 def _compared(scenario: Scenario, engine: GasEngine) -> CellsCompared:

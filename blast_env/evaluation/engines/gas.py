@@ -94,6 +94,7 @@ _AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
 _PROGRESS_CALLS: Final = 100
 
 _FLOORED: Final = "{} cells were raised to the floor of pressure"
+_NOT_FOLLOWED: Final = "adaptive cells follow fronts to protected structures: peaks here are low"
 _SEEN_FACES: Final = 200  # of a structure, most for the share in sight
 
 _FINAL_CELL_M: Final = 0.25
@@ -505,6 +506,8 @@ class GasResult:
         own = own[np.linspace(0, len(own) - 1, min(len(own), _SEEN_FACES)).astype(int)]
         outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
+        if self._is_not_followed(index):
+            return Validation(ValidationStatus.APPROXIMATE, _NOT_FOLLOWED)
         if run.solver.floored_cells:
             return Validation(
                 ValidationStatus.APPROXIMATE, _FLOORED.format(run.solver.floored_cells)
@@ -644,6 +647,13 @@ class GasResult:
             waited = self.end_reason is not EndReason.LOADS_KNOWN
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
             notes.append(f"{NOT_KNOWN}: {why}")
+        if self._is_not_followed(index):
+            notes.append(_NOT_FOLLOWED)
         if self.run.solver.floored_cells:
             notes.append(_FLOORED.format(self.run.solver.floored_cells))
         return tuple(notes)
+
+    def _is_not_followed(self, index: int) -> bool:
+        """Whether fronts on the way to a structure have larger cells than those to others."""
+        outline = self.run.site.structures[index]
+        return self.blast.engine.is_adaptive and not outline.protected and not outline.is_barrier
