@@ -225,6 +225,13 @@ class GasRun:
         """Return whether sound has reached all corners of a structure in plan, by its index."""
         return self.solver.time_s >= sound_s(self.site, corners_m(self.site, [index]))
 
+    def follows(self, index: int) -> bool:
+        """Return whether the fronts on the way to a structure have the smallest cells."""
+        followed = self.site.structures[index].is_barrier or index in watched_structures(
+            self.site, self.settings.until
+        )
+        return followed or not self.settings.is_adaptive
+
     def is_known(self, index: int) -> bool:
         """Return whether the loads on the counted walls of a structure are known, by its index.
 

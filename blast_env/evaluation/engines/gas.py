@@ -506,7 +506,7 @@ class GasResult:
         own = own[np.linspace(0, len(own) - 1, min(len(own), _SEEN_FACES)).astype(int)]
         outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
-        if self._is_not_followed(index):
+        if not self.run.follows(index):
             return Validation(ValidationStatus.APPROXIMATE, _NOT_FOLLOWED)
         if run.solver.floored_cells:
             return Validation(
@@ -647,13 +647,8 @@ class GasResult:
             waited = self.end_reason is not EndReason.LOADS_KNOWN
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
             notes.append(f"{NOT_KNOWN}: {why}")
-        if self._is_not_followed(index):
+        if not self.run.follows(index):
             notes.append(_NOT_FOLLOWED)
         if self.run.solver.floored_cells:
             notes.append(_FLOORED.format(self.run.solver.floored_cells))
         return tuple(notes)
-
-    def _is_not_followed(self, index: int) -> bool:
-        """Whether fronts on the way to a structure have larger cells than those to others."""
-        outline = self.run.site.structures[index]
-        return self.blast.engine.is_adaptive and not outline.protected and not outline.is_barrier
