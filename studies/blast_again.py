@@ -28,7 +28,8 @@ from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.fitting import elements
 from blast_env.tables import table_of
-from studies.blast_table import COLUMNS, load_row, named, scenario_of
+from studies.blast_table import COLUMNS, load_row, named
+from studies.site_names import scenario_of
 
 
 class SiteBlasts(NamedTuple):

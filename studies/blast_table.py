@@ -10,30 +10,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
 
-import numpy as np
 import typer
 
 from blast_env import load_scenario
 from blast_env.answers.terminal import print_line
 from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastKey, BlastStore, StructureLoad, draw_threats
+from blast_env.evaluation import BlastKey, BlastStore, StructureLoad
 from blast_env.files import make_folder
 from blast_env.parquet import write_table
 from blast_env.provenance import versions
 from blast_env.site import Scenario, bundled_scenarios
-from blast_env.site.blast_site import OUTWARDS
-from blast_env.sites import (
-    CLOSE_SIDES_M,
-    FAMILIES,
-    HELD_OUT_SITES,
-    ITEM_SITES,
-    LARGE_SITES,
-    close_ranges,
-    generate_site,
-    large_ranges,
-)
+from blast_env.sites import ITEM_SITES
 from blast_env.tables import Column, table_of
+from studies.site_names import scenario_of, site_names
 
 COLUMNS: Final = (
     Column(
@@ -59,71 +49,6 @@ COLUMNS: Final = (
 )
 """One row per structure and blast."""
 
-SITE_NAME: Final = "item_sites/"
-"""Prefix of the names of generated sites in the table; the seed follows."""
-
-FRONT_SITES: Final = "front_sites"
-"""Close sites on which only the walls that face the charge count, as on bundled sites."""
-
-_SIZED: Final = {
-    "close_sites": close_ranges,
-    FRONT_SITES: close_ranges,
-    LARGE_SITES: large_ranges,
-}
-"""Families of sites with a chosen side: in a name, the side follows, and then the seed."""
-
-_LEAST_SEEN_M: Final = 1.0
-"""Distance of the charge in front of a wall beyond which the wall faces it."""
-
-
-def site_name(seed: int, side_m: float | None = None, *, front: bool = False) -> str:
-    """Return the name of a generated site in the table.
-
-    Args:
-        seed: Seed of the site.
-        side_m: Side of a site of `close_ranges` or `large_ranges`; `None` for `item_sites`.
-        front: Whether the site is reduced by `front_only`; needs a side.
-    """
-    if side_m is None:
-        return f"{SITE_NAME}{seed}"
-    if front:
-        return f"{FRONT_SITES}/{side_m:g}/{seed}"
-    family = "close_sites" if side_m <= CLOSE_SIDES_M[1] else LARGE_SITES
-    return f"{family}/{side_m:g}/{seed}"
-
-
-def scenario_of(name: str) -> Scenario:
-    """Return the scenario of a name in the table."""
-    if name.startswith(SITE_NAME):
-        return generate_site(int(name.removeprefix(SITE_NAME)), FAMILIES[ITEM_SITES])
-    family, *numbers = name.split("/")
-    if family in _SIZED and len(numbers) == 2:
-        side_m, seed = numbers
-        site = generate_site(int(seed), _SIZED[family](float(side_m)))
-        return front_only(site, one_wall=int(seed) % 2 == 1) if family == FRONT_SITES else site
-    return load_scenario(name)
-
-
-def front_only(site: Scenario, one_wall: bool) -> Scenario:
-    """Return a site on which only the walls that face its first threat count.
-
-    Args:
-        site: The site; the first threat has seed 0.
-        one_wall: Keep only the wall that faces it most, of each structure.
-    """
-    (threat,) = draw_threats(site, [0])
-    place_m = np.array(threat.charge_against(site, ()).position_m)
-    structures = []
-    for structure in site.structures:
-        left, bottom, right, top = structure.rectangle_m
-        way_m = place_m - np.clip(place_m, (left, bottom), (right, top))
-        seen_m = {face: float(way_m @ OUTWARDS[face]) for face in structure.faces}
-        most_m = max(seen_m.values())
-        least_m = most_m if one_wall else min(most_m, _LEAST_SEEN_M)
-        faces = tuple(face for face, far_m in seen_m.items() if far_m >= least_m)
-        structures.append(structure.model_copy(update={"faces": faces}))
-    return site.model_copy(update={"structures": tuple(structures)})
-
 
 def main(
     folders: Annotated[list[Path], typer.Argument(help="Folders with blasts.")],
@@ -132,12 +57,9 @@ def main(
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
     ] = 0,
     first: Annotated[int, typer.Option(min=0, help="How many of them are left out.")] = 0,
-    side: Annotated[
-        list[float] | None, typer.Option(help="As many of this side, m: 16 to 24, or 40 to 100.")
+    kind: Annotated[
+        list[str] | None, typer.Option(help="Their kinds, as for `surrogate blasts`.")
     ] = None,
-    front: Annotated[
-        bool, typer.Option("--front", help="Those of this side are `surrogate blasts --front`.")
-    ] = False,
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
     ] = None,
@@ -146,10 +68,8 @@ def main(
     with user_errors():
         known = (*bundled_scenarios(), *(scenario or ()))
         names = dict(named(name, load_scenario(name)) for name in known)
-        for side_m in (None, *(side or ())):
-            for seed in range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites):
-                name = site_name(seed, side_m, front=front)
-                names.update([named(name, scenario_of(name))])
+        for name in site_names(kind or [ITEM_SITES], first, sites):
+            names.update([named(name, scenario_of(name))])
         rows: dict[str, list[dict[str, object]]] = {}
         for folder in folders:
             if not folder.is_dir():

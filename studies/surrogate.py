@@ -22,7 +22,6 @@ from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved
 from blast_env.design.search.moves import Moves, random_walls
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.evaluation.engines import Engine, find_engine
@@ -32,7 +31,7 @@ from blast_env.parquet import read_frame
 from blast_env.provenance import command, versions
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
-from blast_env.sites import HELD_OUT_SITES
+from blast_env.sites import ITEM_SITES
 from blast_env.statistics import reductions
 from blast_env.surrogate.fitting import (
     Errors,
@@ -51,7 +50,8 @@ from blast_env.surrogate.intervals import covered, interval_factor
 from blast_env.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
-from studies.blast_table import COLUMNS, scenario_of, site_name
+from studies.blast_table import COLUMNS
+from studies.site_names import scenario_of, site_names
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_blasts.parquet") for name in ("front_site", "close_site", "many_site")
@@ -71,12 +71,13 @@ app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=F
 def blasts(
     sites: Annotated[int, typer.Option(min=1, help="Generated sites, of training's seeds.")] = 100,
     first: Annotated[int, typer.Option(min=0, help="How many of them are left out.")] = 0,
-    side: Annotated[
-        float | None, typer.Option(help="Their side, m: 16 to 24, or 40 to 100; else 26 m.")
-    ] = None,
-    front: Annotated[
-        bool, typer.Option("--front", help="Only walls count that the blast comes from.")
-    ] = False,
+    kind: Annotated[
+        str,
+        typer.Option(
+            help="item_sites, kerb_sites, or with their side in m: close_sites/18, front_sites/18 "
+            "(only walls count that the blast comes from), large_sites/60."
+        ),
+    ] = ITEM_SITES,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,
     rules: Annotated[int, typer.Option(min=0, help="Most layouts by rules, drawn.")] = 20,
     surrogate: Annotated[Path | None, typer.Option(help="Whose favourites are tried.")] = None,
@@ -98,10 +99,7 @@ def blasts(
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
         recipe = Recipe(layouts, rules, liked, favourites, changes)
-        if front and side is None:
-            raise BlastEnvError("--front needs --side, from 16 to 24 m")
-        seeds = range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites)
-        names = [site_name(seed, side, front=front) for seed in seeds]
+        names = site_names([kind], first, sites)
         engine = find_engine("gas", cells=cells)
         run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, cache=cache)
         with progress_bar("sites") as progress:

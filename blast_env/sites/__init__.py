@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         close_ranges,
         large_ranges,
     )
+    from blast_env.sites.kerb_sites import KerbSiteRanges, kerb_site
     from blast_env.sites.module_sites import SiteRanges
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
     from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
@@ -44,6 +45,7 @@ __all__ = [
     "TARGETS",
     "Draws",
     "ItemSiteRanges",
+    "KerbSiteRanges",
     "Objection",
     "ObstacleSpace",
     "Ranges",
@@ -58,6 +60,7 @@ __all__ = [
     "draw_place",
     "draw_site",
     "generate_site",
+    "kerb_site",
     "large_ranges",
     "training_sites",
     "turned",

@@ -18,11 +18,11 @@ from blast_env.sites.ranges import (
     Numbers,
     ObstacleSpace,
     Probability,
-    Ranges,
     Shifts,
     Side,
     SiteParts,
     Span,
+    SquareRanges,
     WholeSpan,
     ZoneSide,
     draw_path,
@@ -68,7 +68,7 @@ ITEM_KINDS: Final = (
 POST: Final = "post"
 
 
-class ItemSiteRanges(Ranges):
+class ItemSiteRanges(SquareRanges):
     """Ranges of generated sites with a catalogue.
 
     See `Ranges`. With the default sizes a gas blast with cells of 0.5 m takes a fraction of a

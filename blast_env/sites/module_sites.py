@@ -18,11 +18,11 @@ from blast_env.sites.ranges import (
     Numbers,
     ObstacleSpace,
     Probability,
-    Ranges,
     Shifts,
     Side,
     SiteParts,
     Span,
+    SquareRanges,
     ZoneSide,
     draw_path,
     draw_place,
@@ -40,7 +40,7 @@ HYDRANT_SIDE_M: Final = 1.5
 """Side of the square around a hydrant that must stay free."""
 
 
-class SiteRanges(Ranges):
+class SiteRanges(SquareRanges):
     """Ranges of generated sites for the particle model; see `Ranges`.
 
     Attributes:

@@ -87,11 +87,7 @@ class Ranges(Section):
     are drawn on the 0.5 m grid of the modules. Descriptions assume the threat on the left;
     `generate_site` turns the site by right angles.
 
-    Sites of the same ranges have one size, and build zones of one size.
-
     Attributes:
-        side_m: Width and height of the site, m.
-        zone_side_m: Width and height of the build zone, m.
         preset: Preset of the particle model.
         calibration: Name of the calibration for the particle engines.
 
@@ -100,8 +96,6 @@ class Ranges(Section):
             small for these ranges.
     """
 
-    side_m: Side
-    zone_side_m: ZoneSide
     preset: PresetName = "collisional"
     calibration: Name = "collisional_kb"
 
@@ -120,14 +114,26 @@ class Ranges(Section):
         """Return the ranges with other values; see the class for the errors."""
         return type(self)(**{**self.model_dump(), **values})
 
+    def drawn(self, draws: "Draws") -> SiteParts:
+        """Draw a site."""
+        raise NotImplementedError
+
+
+class SquareRanges(Ranges):
+    """Base of the ranges of square sites, all of one size, with square build zones of one size.
+
+    Attributes:
+        side_m: Width and height of the site, m.
+        zone_side_m: Width and height of the build zone, m.
+    """
+
+    side_m: Side
+    zone_side_m: ZoneSide
+
     @property
     def zone_cells(self) -> int:
         """Number of rows and of columns of the build zone."""
         return round(self.zone_side_m / MODULE_SIDE_M)
-
-    def drawn(self, draws: "Draws") -> SiteParts:
-        """Draw a site."""
-        raise NotImplementedError
 
     def _without_room(self, needs_m: Mapping[str, float]) -> Iterator[Problem]:
         """Yield a problem for each need of the ranges for which the site is too small."""

@@ -14,7 +14,7 @@ from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
 from blast_env.site import Charge
-from studies.blast_table import scenario_of
+from studies.site_names import scenario_of
 
 
 @pytest.fixture(scope="module")

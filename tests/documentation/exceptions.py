@@ -146,7 +146,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate blasts --side 18 --front --sites 100 --layouts 4 --rules 5"
+    "python -m studies.surrogate blasts --kind front_sites/18 --sites 100 --layouts 4 --rules 5"
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",
     "python -m studies.blast_table blasts --sites 420 --out blasts.parquet": "--sites 1",
     "python -m studies.surrogate fit --out surrogate.json": (

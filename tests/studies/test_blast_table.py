@@ -1,6 +1,7 @@
 """The tables of the blasts that studies have kept, and those blasts run again."""
 
 import json
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -9,6 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from blast_env import load_scenario
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Piece
@@ -16,6 +18,7 @@ from blast_env.parquet import read_frame, write_table
 from blast_env.site import Charge
 from studies import blast_again, blast_table
 from studies.blast_table import COLUMNS
+from studies.site_names import scenario_of, site_names
 from tests.evaluation.cases import COURTYARD
 
 PIECES = (Piece(0, 0, "wall"),)
@@ -43,24 +46,35 @@ def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
     assert [json.loads(case) for case in table["layout"]] == [[], []]
 
 
-def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
-    out = tmp_path / "blasts.parquet"
-    names = [blast_table.site_name(10_000, side_m) for side_m in (None, 16.0, 40.0)]
+def test_generated_sites_of_all_kinds_are_named(tmp_path: Path) -> None:
+    out, kinds = tmp_path / "blasts.parquet", ("item_sites", "kerb_sites", "close_sites/16")
+    names = site_names(kinds, 0, 1)
+    assert names == ["item_sites/10000", "kerb_sites/10000", "close_sites/16/10000"]
     for name in names:
-        site = blast_table.scenario_of(name)
+        site = scenario_of(name)
         BlastEvaluator(site, FAST, cache=tmp_path / "blasts").loads((), *draw_threats(site, [0]))
-    assert run(tmp_path / "blasts", "--sites", 1, "--side", 16, "--side", 40, "--out", out)[0] == 0
-    assert (
-        set(pd.read_parquet(out)["scenario"])
-        == {*names}
-        == {"item_sites/10000", "close_sites/16/10000", "large_sites/40/10000"}
-    )
+    options = [word for kind in kinds for word in ("--kind", kind)]
+    assert run(tmp_path / "blasts", "--sites", 1, *options, "--out", out)[0] == 0
+    assert set(pd.read_parquet(out)["scenario"]) == {*names}
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("item_sites/16/3", "kind of sites is 'item_sites/16', must be one of item_sites, kerb_"),
+        ("close_sites/3", "kind of sites is 'close_sites'"),
+        ("front_sites/wide/3", "'wide' is no side in m"),
+        ("close_sites/30/3", "side_m is 30, must be 16 to 24"),
+    ],
+)
+def test_a_name_without_a_site_is_an_error(name: str, says: str) -> None:
+    with pytest.raises(BlastEnvError, match=re.escape(says)):
+        scenario_of(name)
 
 
 @pytest.mark.parametrize("seed", [10_004, 10_077])
-def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
-    name, out = blast_table.site_name(seed, 18.0, front=True), tmp_path / "blasts.parquet"
-    site, whole = blast_table.scenario_of(name), blast_table.scenario_of(f"close_sites/18/{seed}")
+def test_walls_of_front_sites_see_the_charge(seed: int) -> None:
+    site, whole = scenario_of(f"front_sites/18/{seed}"), scenario_of(f"close_sites/18/{seed}")
     (threat,) = draw_threats(site, [0])
     x_m, y_m = threat.charge_against(site, ()).position_m
     for structure in site.structures:
@@ -72,10 +86,6 @@ def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
         assert all(seen_m[face] > 0.0 for face in structure.faces)
     (case,) = draw_threats(whole, [0])
     assert case == threat  # nothing but what counts is another
-    BlastEvaluator(site, FAST, cache=tmp_path / "blasts").loads((), threat)
-    options = ("--first", seed - 10_000, "--sites", 1, "--side", 18, "--front", "--out", out)
-    assert run(tmp_path / "blasts", *options)[0] == 0
-    assert set(pd.read_parquet(out)["scenario"]) == {f"front_sites/18/{seed}"}
 
 
 # --- The blasts of a table, run again with the present engine.

@@ -1,0 +1,123 @@
+"""Generated sites by name, such as `item_sites/10400` or `close_sites/18/10400`.
+
+A name is a kind of sites and a seed. Tables of blasts name their sites so.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from blast_env.bundled import ITEM_SITES, LARGE_SITES
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import draw_threats
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.blast_site import OUTWARDS
+from blast_env.sites import (
+    HELD_OUT_SITES,
+    ItemSiteRanges,
+    close_ranges,
+    generate_site,
+    kerb_site,
+    large_ranges,
+)
+
+CLOSE_SITES: Final = "close_sites"
+"""Kind of `close_ranges`; the side in m follows."""
+
+FRONT_SITES: Final = "front_sites"
+"""Kind of close sites on which only the walls that face the charge count."""
+
+KERB_SITES: Final = "kerb_sites"
+"""Kind of `kerb_site`, of any size."""
+
+_LEAST_SEEN_M: Final = 1.0
+"""Distance of the charge in front of a wall beyond which the wall faces it."""
+
+
+def scenario_of(name: str) -> Scenario:
+    """Return the scenario of a name in a table of blasts.
+
+    Args:
+        name: A bundled scenario, or the KIND/SEED of a generated site, where the kind is
+            `item_sites`, `kerb_sites`, or one of `close_sites/18`, `front_sites/18` and
+            `large_sites/60` with the side in m.
+
+    Raises:
+        BlastEnvError: If there is no such scenario or kind, or as `generate_site`.
+    """
+    kind, _, seed = name.rpartition("/")
+    if not kind or not seed.isdecimal():
+        return load_scenario(name)
+    return _maker(kind)(int(seed))
+
+
+def site_names(kinds: Iterable[str], first: int, count: int) -> list[str]:
+    """Return the names of generated sites of the seeds of training.
+
+    Args:
+        kinds: The kinds, as in `scenario_of`.
+        first: How many of each kind are left out.
+        count: How many of each kind there are.
+
+    Raises:
+        BlastEnvError: If there is no such kind.
+    """
+    seeds = range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + count)
+    return [f"{kind}/{seed}" for kind in kinds if _maker(kind) for seed in seeds]
+
+
+def _maker(kind: str) -> Callable[[int], Scenario]:
+    """Return what makes the sites of a kind from their seeds."""
+    family, _, side = kind.partition("/")
+    if not side and family in _UNSIZED:
+        return _UNSIZED[family]
+    if side and family in _SIZED:
+        try:
+            side_m = float(side)
+        except ValueError:
+            raise BlastEnvError(f"kind of sites is {kind!r}: {side!r} is no side in m") from None
+        of_side = _SIZED[family]
+        return lambda seed: of_side(seed, side_m)
+    sized = (f"{name}/SIDE" for name in _SIZED)
+    raise BlastEnvError(
+        f"kind of sites is {kind!r}, must be one of {', '.join((*_UNSIZED, *sized))}"
+    )
+
+
+def _item_site(seed: int) -> Scenario:
+    return generate_site(seed, ItemSiteRanges())
+
+
+def _close_site(seed: int, side_m: float) -> Scenario:
+    return generate_site(seed, close_ranges(side_m))
+
+
+def _large_site(seed: int, side_m: float) -> Scenario:
+    return generate_site(seed, large_ranges(side_m))
+
+
+def _front_site(seed: int, side_m: float) -> Scenario:
+    """Return a close site on which only walls count that face the charge; of odd seeds, one."""
+    site = _close_site(seed, side_m)
+    (threat,) = draw_threats(site, [0])
+    place_m = np.array(threat.charge_against(site, ()).position_m)
+    structures = []
+    for structure in site.structures:
+        left, bottom, right, top = structure.rectangle_m
+        way_m = place_m - np.clip(place_m, (left, bottom), (right, top))
+        seen_m = {face: float(way_m @ OUTWARDS[face]) for face in structure.faces}
+        most_m = max(seen_m.values())
+        least_m = most_m if seed % 2 == 1 else min(most_m, _LEAST_SEEN_M)
+        faces = tuple(face for face, far_m in seen_m.items() if far_m >= least_m)
+        structures.append(structure.model_copy(update={"faces": faces}))
+    return site.model_copy(update={"structures": tuple(structures)})
+
+
+_UNSIZED: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
+    {ITEM_SITES: _item_site, KERB_SITES: kerb_site}
+)
+_SIZED: Final[Mapping[str, Callable[[int, float], Scenario]]] = MappingProxyType(
+    {CLOSE_SITES: _close_site, FRONT_SITES: _front_site, LARGE_SITES: _large_site}
+)
