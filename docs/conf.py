@@ -66,12 +66,7 @@ PUBLIC: Final = (
 """Packages whose `__all__` is documented; a name of several of them, with the first."""
 
 _MAGIC: Final = "%%bash\n"
-_MARK: Final = re.compile(r"^<!-- (docstring|names|commands) of ([\w.]+) -->$", re.MULTILINE)
-
-
-def _docstring(path: str) -> str:
-    module, _, name = path.rpartition(".")
-    return inspect.getdoc(getattr(import_module(module), name)) or ""
+_MARK: Final = re.compile(r"^<!-- (names|commands) of ([\w.]+) -->$", re.MULTILINE)
 
 
 def _names(package: str) -> str:
@@ -112,14 +107,13 @@ def _cell(text: str | None) -> str:
 
 
 _WRITERS: Final[dict[str, Callable[[str], str]]] = {
-    "docstring": _docstring,
     "names": _names,
     "commands": _commands,
 }
 
 
 def _fill_in(_app: Any, _page: str, source: list[str]) -> None:
-    """Fill in marks such as `<!-- docstring of NAME -->` with texts from the code."""
+    """Fill in marks such as `<!-- names of PACKAGE -->` with texts from the code."""
     source[0] = _MARK.sub(lambda mark: _WRITERS[mark[1]](mark[2]), source[0])
 
 

@@ -78,6 +78,8 @@ class FeaturesObservation:
     If the scenario has a vehicle, the box from 3 on encloses its entries. For such scenarios, and
     for those drawn among others with a vehicle, one more value comes last: the stand-off of the
     vehicle with the modules placed so far, as a share of the site's diagonal; 1 without a vehicle.
+
+    `OBSERVATIONS["features"].names(scenario)` names each value.
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
@@ -90,6 +92,37 @@ class FeaturesObservation:
                 MOST_STRUCTURES + 3 * len(catalogue.names) + (2 + len(catalogue.variants)) * cells
             )
         return spaces.Box(0.0, 1.0, (length,), np.float32)
+
+    def names(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return what each value is, in the order of the vector (features,); all are shares.
+
+        Args:
+            scenario: The scenario.
+        """
+        zone, catalogue = scenario.zone, scenario.zone.catalogue
+        cells = [f"cell ({row}, {column})" for row, column in np.ndindex(zone.shape)]
+        sides = ("left", "bottom", "right", "top")
+        found = ["modules left / at first", "modules left / 100", "budget left / at first"]
+        found += [f"charge: {side}" for side in sides]
+        found += ["charge: least cube root of mass", "charge: largest cube root of mass"]
+        found += ["build zone: left", "build zone: bottom"]
+        for number in range(MOST_STRUCTURES):
+            parts = (*sides, "is there", "weight / largest weight")
+            found += [f"structure {number}: {part}" for part in parts]
+        for what in ("module", "legal", "cost / highest cost"):
+            found += [f"{cell}: {what}" for cell in cells]
+        if catalogue.has_items:
+            found += [f"structure {number}: height / 12 m" for number in range(MOST_STRUCTURES)]
+            for what in ("height / 12 m", "cost / budget", "pieces left / at first"):
+                found += [f"{name}: {what}" for name in catalogue.names]
+            for what in ("height of the module / 12 m", "stops vehicles"):
+                found += [f"{cell}: {what}" for cell in cells]
+            for variant in catalogue.variants:
+                turned = ", turned" if variant.turned else ""
+                found += [f"{cell}: {variant.name}{turned} is legal" for cell in cells]
+        if scenario.vehicles:
+            found.append("vehicle: stand-off / diagonal of the site")
+        return tuple(found)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":
         """Compute the constant values.

@@ -14,7 +14,15 @@ from blast_env.envs.observations import FeaturesObservation
 from blast_env.envs.planes import GridObservation, ImageObservation, SiteGrid
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
-from blast_env.site import AnySource, PointSource, RectangleSource, Scenario, SegmentSource, Site
+from blast_env.site import (
+    AnySource,
+    PointSource,
+    RectangleSource,
+    Scenario,
+    SegmentSource,
+    Site,
+    load_scenario,
+)
 from tests.catalogue_sites import yard
 from tests.envs.small import make, play, restricted_scenario, same, small_document, small_scenario
 from tests.vehicle_sites import gate_site
@@ -205,6 +213,26 @@ def test_cells_row_by_row() -> None:
     assert np.flatnonzero(barrier).tolist() == [7]
     assert (free == info["action_mask"][:-1]).all()
     assert (cost == 1.0).all()
+
+
+@pytest.mark.parametrize("name", ["courtyard", "hotel_forecourt", "control_room"])
+def test_each_value_of_the_vector_has_a_name(name: str) -> None:
+    scenario = load_scenario(name)
+    names = FeaturesObservation().names(scenario)
+    assert (len(names),) == FeaturesObservation().space(scenario).shape
+    assert len({*names}) == len(names)
+    env = make(scenario, observation="features", engine="surrogate")
+    before, _ = env.reset(seed=1)
+    action = int(env.action_masks()[:-1].argmax())
+    variants, (rows, columns) = scenario.zone.catalogue.variants, scenario.zone.shape
+    variant, cell = divmod(action, rows * columns)
+    after, *_ = env.step(action)
+    changed = {names[number] for number in np.flatnonzero(before != after)}
+    assert f"cell {divmod(cell, columns)}: module" in changed
+    assert "modules left / at first" in changed
+    assert not any(name.startswith(("structure", "charge", "build zone")) for name in changed)
+    if scenario.zone.items:
+        assert f"{variants[variant].name}: pieces left / at first" in changed
 
 
 def test_too_many_structures_are_named() -> None:

@@ -1,0 +1,57 @@
+"""Sites along a kerb: valid, of many sizes, like the small bundled ones."""
+
+from functools import cache
+
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import draw_threats
+from blast_env.site import Scenario
+from blast_env.sites import KerbSiteRanges, generate_site, kerb_site
+from blast_env.sites.kerb_sites import ACROSS_M, ALONG_M
+
+SEEDS = range(20_000, 20_012)
+
+
+@cache
+def sites() -> tuple[Scenario, ...]:
+    return tuple(kerb_site(seed) for seed in SEEDS)
+
+
+def test_a_seed_gives_its_site_and_no_other() -> None:
+    assert kerb_site(SEEDS[0]) == sites()[0]
+    assert len({site.content_hash for site in sites()}) == len(SEEDS)
+
+
+def test_sizes_masses_and_threats_differ_within_their_bounds() -> None:
+    sizes = {(site.site.width_m, site.site.height_m) for site in sites()}
+    assert len(sizes) > len(SEEDS) // 2
+    low, high = min(ACROSS_M[0], ALONG_M[0]), max(ACROSS_M[1], ALONG_M[1])
+    assert all(low <= side <= high for size in sizes for side in size)
+    masses = {source.tnt_kg for site in sites() for source in site.charge}
+    assert min(masses) >= 15.0
+    assert max(masses) <= 200.0
+    assert max(masses) > 2.0 * min(masses)
+    assert {source.kind for site in sites() for source in site.charge} == {"point", "vehicle"}
+    assert {len(site.structures) for site in sites()} > {1, 2}
+
+
+def test_the_charge_lies_outside_of_all_buildings() -> None:
+    for site in sites():
+        for threat in draw_threats(site, [0, 1]):
+            x_m, y_m = threat.charge_against(site, ()).position_m
+            for structure in site.structures:
+                left, bottom, right, top = structure.rectangle_m
+                assert not (left < x_m < right and bottom < y_m < top)
+
+
+def test_a_side_out_of_bounds_is_an_error() -> None:
+    with pytest.raises(BlastEnvError, match="along_m"):
+        KerbSiteRanges(across_m=14.0, along_m=0.7)
+
+
+def test_a_given_size_is_that_of_every_site() -> None:
+    ranges = KerbSiteRanges(across_m=16.0, along_m=12.0)
+    for seed in SEEDS[:3]:
+        size = generate_site(seed, ranges).site
+        assert {size.width_m, size.height_m} == {16.0, 12.0}
