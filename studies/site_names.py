@@ -64,8 +64,11 @@ def site_names(kinds: Iterable[str], first: int, count: int) -> list[str]:
     Raises:
         BlastEnvError: If there is no such kind.
     """
-    seeds = range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + count)
-    return [f"{kind}/{seed}" for kind in kinds if _maker(kind) for seed in seeds]
+    seeds, found = range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + count), []
+    for kind in kinds:
+        _maker(kind)  # refuses a kind that there is not
+        found += [f"{kind}/{seed}" for seed in seeds]
+    return found
 
 
 def _maker(kind: str) -> Callable[[int], Scenario]:
