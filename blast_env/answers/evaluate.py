@@ -13,8 +13,10 @@ from blast_env.answers.document import (
     building_words,
     interval,
     lines,
+    percent,
     validation_lines,
 )
+from blast_env.evaluation import BlastCounts
 from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.questions.reduction import Evaluation
 from blast_env.geometry import layout_counts
@@ -63,6 +65,14 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
             "their spread, not an uncertainty about others"
         )
     yield from lines((f"note: {note}" for note in found.notes), "flag")
+
+
+def cache_line(counts: BlastCounts) -> Line:
+    """Return the counts of blasts that were run, and known already."""
+    return Line.of(
+        f"{counts.blasts:g} blasts run, {counts.cache_hits:g} known already "
+        f"(cache hit rate {percent(counts.cache_hit_rate)})"
+    )
 
 
 def evaluation_picture(found: Evaluation) -> "Figure":

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from blast_env.answers.advise import advice_answer, advice_figure
-from blast_env.answers.terminal import print_line, print_parts
+from blast_env.answers.terminal import print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     FINAL_CELLS,
@@ -25,7 +25,7 @@ from blast_env.cli.options import (
     resume_words,
     wanted_level,
 )
-from blast_env.cli.output import print_cost, print_written, progress_bar, resumable, save_figures
+from blast_env.cli.output import blasts_running, print_written, resumable, save_figures
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import (
@@ -95,20 +95,20 @@ def advise(
     evaluator = BlastEvaluator(site, engine, cache=cache)
     problem = DesignProblem(evaluator, LoadCaseSet(site, threats), processes)
     kinds = kinds_for(site)
-    print_line(
+    words = (
         f"{len(kinds)} kinds, at most {rounds} searches of {budget} blasts each, {engine.words}; "
         f"each result is judged with {len(threats)}, {judge.words}"
     )
+    searches = len(kinds) * rounds
     coarse, fine = (
         [own.cost(site, threat.charge) for threat in threats] for own in (engine, judge)
     )
-    costs = [*islice(cycle(coarse), len(kinds) * rounds * budget), *fine * (len(kinds) * rounds)]
-    print_cost(cost for cost in costs if cost is not None)
+    costs = [*islice(cycle(coarse), searches * budget), *fine * searches]
     judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
-    with resumable(resume_words(cache)), progress_bar(f"{len(kinds)} kinds") as progress:
+    label = f"{len(kinds)} kinds"
+    with resumable(resume_words(cache)), blasts_running(label, words, costs) as progress:
         found = advised(judging, budget, rounds, seed, progress)
     print_parts(advice_answer(found))
-    if out is not None:
-        made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
-        print_written([write_layout(out, site, found.best.layout, made)])
-    print_written(save_figures((picture, partial(advice_figure, found))))
+    made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
+    written = [] if out is None else [write_layout(out, site, found.best.layout, made)]
+    print_written([*written, *save_figures((picture, partial(advice_figure, found)))])

@@ -1,6 +1,6 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -37,9 +37,10 @@ from blast_env.cli.options import (
     resume_words,
     wanted_level,
 )
-from blast_env.cli.output import print_cost, print_written, progress_bar, resumable, save_figures
+from blast_env.cli.output import blasts_running, print_written, resumable, save_figures
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase
+from blast_env.evaluation import LoadCase
+from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines import JUDGE, Engine, final_engine
 from blast_env.evaluation.questions.capacity import MOST_BLASTS
@@ -57,7 +58,7 @@ from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
-from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 from blast_env.site.presets import (
     CHARGE_PRESETS,
     EQUIVALENTS_SOURCE,
@@ -146,55 +147,51 @@ def assess(
         raise BlastEnvError("--screen and --capacity exclude each other")
     site = load_scenario(scenario).with_facades(glazing, wall)
     required = [Requirement.parsed(own) for own in require or ()]
-    layouts: dict[str, Layout] = {"no barrier": ()}
-    if layout is not None:
-        elements = tuple(load_layout(layout, site))
-        layouts[layout_counts(elements, "barrier")] = elements
+    elements = () if layout is None else tuple(load_layout(layout, site))
     engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     if screen:
         refuse_given(context, _OF_DRAWN_CHARGES + _OF_ASSESSMENT, "does not apply to --screen")
-        *_, last = layouts.values()
-        _screen(site, last, mass, required, engine if gas else None, picture)
+        _screen(site, elements, mass, required, engine if gas else None, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
+    layouts: dict[str, Layout] = {"no barrier": ()}
+    if layout is not None:
+        layouts[layout_counts(elements, "barrier")] = elements
     threats = ChargeInput.of(charge, tnt_kg).threats(site, charges)
-    drawn = [threat.charge for threat in threats]
+    campaign = Campaign.on(site, layouts, threats, engine, engine.coarser, cache)
     level = wanted_level(target, site, LevelOfProtection.LOW)
-    if capacity:
-        refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
-        evaluator = BlastEvaluator(site, engine, cache=cache)
-        with resumable(resume_words(cache)):
-            _capacity(evaluator, layouts, drawn)
-        return
-    check_facades(site, engine)
-    campaign = replace(
-        Campaign.on(site, layouts, threats, engine, engine.coarser, cache),
-        without_fallen=without_fallen,
-    )
-    print_line(engine.describe([site]))
-    print_cost(campaign.cost())
     with resumable(resume_words(cache)):
-        with progress_bar(count_of("charge", len(drawn))) as progress:
-            blasts = campaign.run(progress, worst=governing)
-        found = consequences_by_layout(blasts)
-        print_parts(assessment(blasts, found, level, mass_error, required))
-    if table is not None:
-        print_written([write_csv(bay_table(found), table)])
+        if capacity:
+            refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
+            _capacity(campaign)
+            return
+        check_facades(site, engine)
+        found = _damage(replace(campaign, without_fallen=without_fallen))
+        print_parts(assessment(*found, level, mass_error, required))
+    _, consequences = found
+    written = [] if table is None else [write_csv(bay_table(consequences), table)]
     drawings = (picture, facade_figure), (diagram, pressure_impulse_figure)
-    figures = ((path, partial(draw, site, found)) for path, draw in drawings)
-    print_written(save_figures(*figures))
+    figures = ((path, partial(draw, site, consequences)) for path, draw in drawings)
+    print_written([*written, *save_figures(*figures)])
 
 
-def _capacity(
-    evaluator: BlastEvaluator, layouts: Mapping[str, Layout], charges: Sequence[AnyCharge]
-) -> None:
+def _damage(campaign: Campaign) -> tuple[Blasts, dict[str, Consequences]]:
+    """Return the blasts of a campaign, and the consequences of each layout."""
+    label = count_of("charge", len(campaign.case.threats))
+    words = campaign.evaluator.engine.describe([campaign.scenario])
+    with blasts_running(label, words, campaign.cost()) as progress:
+        blasts = campaign.run(progress, worst=governing)
+    return blasts, consequences_by_layout(blasts)
+
+
+def _capacity(campaign: Campaign) -> None:
     """Print the largest charges and the least stand-offs that keep each level."""
-    site, engine = evaluator.scenario, evaluator.engine
-    print_line(engine.describe([site]))
-    costs = Campaign.on(site, layouts, list(map(LoadCase, charges)), engine).cost()
-    print_cost(costs * MOST_BLASTS)
-    with progress_bar(f"{site.name}: masses and stand-offs") as progress:
-        found = capacity_of(evaluator, layouts, charges, progress)
+    site, evaluator = campaign.scenario, campaign.evaluator
+    charges = [threat.charge for threat in campaign.case.threats]
+    costs = replace(campaign, coarser=None).cost() * MOST_BLASTS
+    label = f"{site.name}: masses and stand-offs"
+    with blasts_running(label, evaluator.engine.describe([site]), costs) as progress:
+        found = capacity_of(evaluator, campaign.layouts, charges, progress)
     print_parts(capacity_answer(site, found))
 
 
@@ -234,8 +231,7 @@ def _by_gas(
     """Return the consequences of each worst place by gas dynamics."""
     threats = [LoadCase(threat.charge, name=threat.name) for threat in found.threats]
     campaign = Campaign.on(scenario, {"": layout}, threats, engine)
-    print_line(engine.describe([scenario]))
-    print_cost(campaign.cost())
-    with progress_bar(f"{len(threats)} blasts") as progress:
+    label = f"{len(threats)} blasts"
+    with blasts_running(label, engine.describe([scenario]), campaign.cost()) as progress:
         blasts = campaign.run(progress)
     return {own.name: consequences_of(blasts.under([k])) for k, own in enumerate(threats)}

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import typer
 
+from blast_env.answers.calibrate import calibration_answer
 from blast_env.answers.terminal import print_line
 from blast_env.cli.command import writes
 from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, numbers, running_on
-from blast_env.cli.output import print_written, progress_bar, resumable, save_pictures
+from blast_env.cli.output import print_outcome, progress_bar, resumable, save_pictures
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, PAPER_ENGINES, find_engine
 from blast_env.files import make_folder
-from blast_env.particles.calibration.laws import LawName, shape_rms_percent
+from blast_env.particles.calibration.laws import LawName
 from blast_env.particles.calibration.model import (
     Calibration,
     SimulatedQuantity,
     save_calibration,
 )
-from blast_env.particles.calibration.paper_table import paper_table
 from blast_env.site import Scenario, load_scenario
 from blast_env.tables import write_csv
 from blast_env.values import plain_number
@@ -102,8 +102,7 @@ def calibrate(
     stored = report.calibration(name, law).model_copy(update={"tnt_range_kg": tnt_range_kg})
     written = _write(report, stored, stem)
     print_line(used.describe([study.scenario]))
-    _print(report, stored)
-    print_written([*written, kept])
+    print_outcome(calibration_answer(report, stored), [*written, kept])
 
 
 def _parse_numbers(option: str, text: str) -> tuple[float, ...]:
@@ -148,29 +147,3 @@ def _figure(report: "CalibrationReport", stored: Calibration) -> "Figure":
     from blast_env.plots.calibration_figures import calibration_figure
 
     return calibration_figure(report, stored.name)
-
-
-def _print(report: "CalibrationReport", stored: Calibration) -> None:
-    print_line(
-        f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
-        f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}"
-    )
-    for name, metrics in report.metrics.items():
-        coefficients = ", ".join(
-            f"{k} = {v:.5g}" for k, v in report.laws[name].coefficients.items()
-        )
-        print_line(
-            f"{name}: {coefficients}; MAPE {metrics.mape_percent:.2f} %, RMSE {metrics.rmse:.4f} "
-            f"psi s, integral error {metrics.integral_error_percent:.2f} %"
-        )
-    intervals = ", ".join(
-        f"{k} {low:.4g} to {high:.4g}" for k, (low, high) in stored.coefficient_intervals.items()
-    )
-    print_line(
-        f"stored: {stored.law}; 95 % intervals over seeds: {intervals}; leave-one-distance-out "
-        f"MAPE {stored.metrics.leave_one_out_mape_percent:.2f} %"
-    )
-    if stored.reference.source == "paper UFC column":
-        own = paper_table().set_index("r_m").i_sim.loc[list(stored.distances_m)].to_numpy()
-        rms = shape_rms_percent(stored.i_sim, own)
-        print_line(f"against the paper's own i_sim: {rms:.1f} % rms after one common factor")

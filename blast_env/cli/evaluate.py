@@ -8,9 +8,8 @@ from typing import Any, Final
 
 import typer
 
-from blast_env.answers.document import percent
-from blast_env.answers.evaluate import evaluation_answer, evaluation_picture
-from blast_env.answers.terminal import print_line, print_parts
+from blast_env.answers.evaluate import cache_line, evaluation_answer, evaluation_picture
+from blast_env.answers.terminal import print_parts
 from blast_env.cli.command import Target, note_target, writes
 from blast_env.cli.options import (
     SCENARIO_HELP,
@@ -29,15 +28,21 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
+    blasts_running,
     layout_picture,
-    print_cost,
-    print_json,
-    print_written,
-    progress_bar,
+    print_outcome,
+    print_record,
     resumable,
     save_pictures,
 )
-from blast_env.evaluation import BlastEvaluator, Evaluation, LoadCaseSet, SeedRange, compare
+from blast_env.evaluation import (
+    BlastCounts,
+    BlastEvaluator,
+    Evaluation,
+    LoadCaseSet,
+    SeedRange,
+    compare,
+)
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines import JUDGE, final_engine
 from blast_env.files import make_folder, write_text
@@ -105,16 +110,12 @@ def evaluate(
         if out is not None:
             make_folder(out)
         evaluator = BlastEvaluator(site, used, cache=cache)
-        if not as_json:
-            print_line(used.describe([site]))
-            sides = {"without": (), "with": tuple(elements)}
-            print_cost(Campaign(case, sides, evaluator, evaluator.coarser()).cost())
-        with progress_bar(f"{2 * len(case.threats)} blasts in {site.name}") as progress:
+        sides = {"without": (), "with": tuple(elements)}
+        costs = Campaign(case, sides, evaluator, evaluator.coarser()).cost()
+        label, words = f"{2 * len(case.threats)} blasts in {site.name}", used.describe([site])
+        with blasts_running(label, words, costs, is_quiet=as_json) as progress:
             found = compare(
-                evaluator,
-                [case],
-                [elements],
-                processes,
+                *(evaluator, [case], [elements], processes),
                 with_error=True,
                 cvar_level=cvar_level,
                 progress=progress,
@@ -125,19 +126,18 @@ def evaluate(
     written = [] if out is None else _write(found, record, out)
     if export is not None:
         written += export_to(LayoutPlan(site, found.layout, provenance=provenance), export)
-    counts = evaluator.counts
     if as_json:
-        hits = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
-        cached = {"blasts": counts.blasts, **hits}
-        more = {"cache": cached, "files": [str(path) for path in written]}
-        print_json({key: x for key, x in {**record, **more}.items() if key not in _LEFT_OUT})
+        print_record(_summary(record, evaluator.counts), written)
         return
-    print_parts(evaluation_answer(found, drawn))
-    print_written(written)
-    print_line(
-        f"{counts.blasts:g} blasts run, {counts.cache_hits:g} known already "
-        f"(cache hit rate {percent(counts.cache_hit_rate)})"
-    )
+    print_outcome(evaluation_answer(found, drawn), written)
+    print_parts([cache_line(evaluator.counts)])
+
+
+def _summary(record: Mapping[str, Any], counts: BlastCounts) -> dict[str, Any]:
+    """Return the record for `--json`, with the use of the cache."""
+    hits = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
+    short = {key: value for key, value in record.items() if key not in _LEFT_OUT}
+    return {**short, "cache": {"blasts": counts.blasts, **hits}}
 
 
 _LEFT_OUT: Final = ("scenario", "threats", "modules")

@@ -1,6 +1,5 @@
 """`blast-env import`: a site from a map or drawing."""
 
-from collections import Counter
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
@@ -8,12 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.answers.document import titled
-from blast_env.answers.terminal import print_line, print_table
+from blast_env.answers.imported import import_answer
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.interruptions import Interruptions
 from blast_env.cli.options import GlazingOption, WallOption, numbers
-from blast_env.cli.output import print_json, print_written, save_pictures
+from blast_env.cli.output import print_outcome, print_record, save_pictures
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 
@@ -24,10 +22,6 @@ if TYPE_CHECKING:
 
 _PLACE: Final = (
     "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
-)
-_HEADERS: Final = (
-    *("building", "protected", "parts", "height (m)", "area (m2)", "modules (m2)"),
-    *("area off (%)", "outline off (m)"),
 )
 
 
@@ -146,9 +140,9 @@ def import_map(
     if ledger is not None:
         written.append(imported.ledger.save(ledger))
     if as_json:
-        print_json({**imported.record, "files": [str(path) for path in written]})
+        print_record(imported.record, written)
     else:
-        _print(imported, written)
+        print_outcome(import_answer(imported), written)
 
 
 def _options(context: typer.Context) -> ImportOptions:
@@ -170,33 +164,3 @@ def _plan(imported: "ImportedSite") -> "Figure":
     from blast_env.io.imported_site import imported_plan
 
     return imported_plan(imported)
-
-
-def _print(imported: "ImportedSite", written: list[Path]) -> None:
-    width_m, height_m = imported.site.size_m
-    rows = [
-        (
-            titled(building.name, building.title) + (" (cut)" if building.is_cut else ""),
-            "yes" if building.protected else "no",
-            f"{len(building.polygons)}",
-            "air" if building.height_m is None else f"{building.height_m:g}",
-            f"{building.outline.area:,.1f}",
-            f"{building.area_m2:,.1f}",
-            f"{100.0 * building.deviation.area_share:.1f}",
-            f"{building.deviation.outline_m:.2f}",
-        )
-        for building in imported.buildings
-    ]
-    size, turned = f"{width_m:g} x {height_m:g} m", imported.site.rotation_deg
-    title = f"{imported.scenario.name}: {size}, turned by {turned:.2f} degrees"
-    print_table(title, _HEADERS, rows)
-    print_line(
-        f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
-        f"{imported.scenario.simulation.preset}"
-    )
-    sums = Counter(entry.fate for entry in imported.ledger.entries)
-    words = ", ".join(f"{fate} {count}" for fate, count in sums.items())
-    print_line(f"ledger of {imported.ledger.objects} objects: {words}")
-    for note in imported.notes:
-        print_line(f"note: {note}")
-    print_written(written)

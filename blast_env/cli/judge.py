@@ -10,7 +10,7 @@ from typing import Final
 
 import typer
 
-from blast_env.answers.terminal import print_line, print_parts
+from blast_env.answers import Line
 from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
@@ -35,7 +35,7 @@ from blast_env.benchmark import judge as judge_submission
 from blast_env.benchmark.judging import read_submission
 from blast_env.cli.command import writes
 from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
-from blast_env.cli.output import print_written, progress_bar, resumable
+from blast_env.cli.output import print_outcome, print_written, progress_bar, resumable
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastStore
@@ -43,6 +43,7 @@ from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_text
 
 _KEPT: Final = 4096
+_NO_STANDINGS: Final = (Line.of("no submissions come with the package"),)
 
 
 def judge(
@@ -109,9 +110,7 @@ def judge(
         if out is not None:
             make_folder(out)
         submitted = [read_submission(path) for path in submissions]
-        judged = [
-            judging.judged(submission, DEFINITIONS, stored_references()) for submission in submitted
-        ]
+        judged = [judging.judged(item, DEFINITIONS, stored_references()) for item in submitted]
         if plays:
             definitions = _definitions(problem, secret, sites, scenario, threat, cases)
             played = [
@@ -120,17 +119,11 @@ def judge(
             ]
             references = stored_references()
             if secret is not None or scenario:
-                from blast_env.benchmark.methods import references_of
-
-                guided = judging.made if secret is not None else None
-                references = references_of(definitions, played, cell_m, judging.shared, guided)
+                references = judging.references(played, definitions, is_secret=secret is not None)
             judged += [judging.judged(item, definitions, references) for item in played]
     together = (*shipped_standings(), *judged)
-    print_parts(standings_tables(together))
-    if not together:
-        print_line("no submissions come with the package")
-    if page is not None:
-        print_written([write_text(page, standings_page(together))])
+    written = [] if page is None else [write_text(page, standings_page(together))]
+    print_outcome(standings_tables(together) if together else _NO_STANDINGS, written)
 
 
 def _definitions(
@@ -211,6 +204,19 @@ class _Judging:
         if self.out is not None:
             print_written([submission.save(self.out / f"{_file_name(name)}.json")])
         return submission
+
+    def references(
+        self,
+        played: Sequence[Submission],
+        definitions: Mapping[str, Definition],
+        *,
+        is_secret: bool,
+    ) -> Mapping[str, ScoreReference]:
+        """Return the references of problems of your own, or of secret ones."""
+        from blast_env.benchmark.methods import references_of
+
+        guided = self.made if is_secret else None
+        return references_of(definitions, played, self.cell_m, self.shared, guided)
 
     def judged(
         self,

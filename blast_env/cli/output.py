@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from blast_env.answers.terminal import plain_console, print_line
+from blast_env.answers.document import AnyPart
+from blast_env.answers.terminal import plain_console, print_line, print_parts
 from blast_env.cli.interruptions import Interruptions
 from blast_env.errors import BlastEnvError, BlastEnvWarning, MissingExtraError
 from blast_env.gas.cost import CostGuess, cost_words
@@ -113,8 +114,15 @@ def resumable(words: str | Callable[[], str]) -> Iterator[None]:
         raise InterruptedCommandError(NOTHING_HALF_WRITTEN, resume) from interruption
 
 
-def print_json(content: Mapping[str, object]) -> None:
-    """Print plain data as JSON to standard output."""
+def print_outcome(parts: Iterable[AnyPart], written: Sequence[Path] = ()) -> None:
+    """Print the parts of an answer, and the files written."""
+    print_parts(parts)
+    print_written(written)
+
+
+def print_record(record: Mapping[str, object], written: Iterable[Path]) -> None:
+    """Print the record of an answer and the files written, as JSON, to standard output."""
+    content = {**record, "files": [str(path) for path in written]}
     print_line(json.dumps(content, indent=2, allow_nan=False))
 
 
@@ -166,11 +174,28 @@ def progress_bar(label: str) -> Iterator[Callable[..., None]]:
         yield lambda share, words="": progress.update(task, completed=share, words=words)
 
 
-def print_cost(costs: Iterable[CostGuess]) -> None:
-    """Print the cost of blasts before they start, if it can be estimated."""
-    found = list(costs)
-    if found:
-        print_line(f"up to {cost_words(found)}")
+@contextmanager
+def blasts_running(
+    label: str, words: str, costs: Iterable[CostGuess | None], *, is_quiet: bool = False
+) -> Iterator[Callable[..., None]]:
+    """Say what runs the blasts of a block, and their cost; then show their progress.
+
+    Args:
+        label: What runs, beside the bar.
+        words: The engine in words.
+        costs: Estimated cost of each blast; `None` for one without an estimate.
+        is_quiet: Whether only the progress is shown, since standard output is for JSON.
+
+    Yields:
+        A function to call with the completed share, as of `progress_bar`.
+    """
+    if not is_quiet:
+        print_line(words)
+        known = [cost for cost in costs if cost is not None]
+        if known:
+            print_line(f"up to {cost_words(known)}")
+    with progress_bar(label) as progress:
+        yield progress
 
 
 def _progress_lines(console: Console, label: str) -> Callable[..., None]:

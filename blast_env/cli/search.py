@@ -1,19 +1,19 @@
 """`blast-env search`: the layout with the least load, for a budget of blasts, or for none."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import typer
 
-from blast_env.answers.assess import cells_words
-from blast_env.answers.document import AnyCell, Number, interval, percent
-from blast_env.answers.terminal import print_line, print_table
+from blast_env.answers.document import percent
+from blast_env.answers.search import SearchRun, judged_answer, proposal_words, search_answer
+from blast_env.answers.terminal import print_line, print_parts
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     SCENARIO_HELP,
@@ -34,8 +34,9 @@ from blast_env.cli.output import (
     LAYOUT_NAME,
     LAYOUT_PICTURE,
     InterruptedCommandError,
+    blasts_running,
     layout_picture,
-    print_cost,
+    print_outcome,
     print_written,
     progress_bar,
     resumable,
@@ -47,7 +48,6 @@ from blast_env.design.search import (
     DesignProblem,
     Progress,
     Proposer,
-    SearchResult,
     find_proposer,
     layouts_by_rule,
     proposers,
@@ -70,14 +70,13 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.files import make_folder
-from blast_env.geometry import Layout, layout_counts
-from blast_env.layout import LayoutState, load_layout, write_layout
+from blast_env.geometry import Layout
+from blast_env.layout import load_layout, write_layout
 from blast_env.provenance import command, versions
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario, load_scenario
-from blast_env.site.objective import ConditionalValueAtRisk, WorstRisk
 from blast_env.site.zone import source_bounds_m
-from blast_env.statistics import CVAR_LEVEL, reductions
+from blast_env.statistics import CVAR_LEVEL
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
@@ -88,8 +87,6 @@ ThreatName = Literal["visible", "hidden"]
 
 _METHOD_HELP: Final = f"{', '.join(proposers())}. package runs no blast."
 PACKAGE: Final = PackageProposer().name
-_PROPOSAL: Final = "this proposal"
-_NOTHING: Final = "no barrier"
 _SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
@@ -99,6 +96,14 @@ _WITH_BLASTS: Final = (
     *("cell_m", "start_from", "surrogate", "held_out", "cluster", "cache"),
 )
 """Options of the searches by blasts alone."""
+
+_OF_OTHER_THREAT: Final = MappingProxyType(
+    {
+        "hidden": (("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"),
+        "visible": (("threats",), "is for a hidden threat: a visible one is known"),
+    }
+)
+"""Options that do not apply to a threat, and why."""
 
 
 def search(
@@ -163,49 +168,49 @@ def search(
         return
     if verify:
         raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
+    refuse_given(context, *_OF_OTHER_THREAT[threat])
     with running_on(cluster), resumable(resume_words(cache)):
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)
         proposer, digest = _method(method, site, start_from, surrogate)
-        known = None
-        if threat == "hidden":
-            refuse_given(
-                context, ("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"
-            )
-        else:
-            refuse_given(context, ("threats",), "is for a hidden threat: a visible one is known")
-            # The known charge is always drawn by the seed of the search.
-            known = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
+        known = None if threat == "hidden" else _known_charge(site, given, seed)
+        own_risk = find_risk(risk, CVAR_LEVEL)
         problem = search_problem(
-            site,
-            known,
-            used,
-            cache,
+            *(site, known, used, cache),
             threats=threats,
             seed=seed,
-            risk=find_risk(risk, CVAR_LEVEL),
+            risk=own_risk,
             processes=processes,
         )
         run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
         if run.result.interrupted and not run.result.history:
             raise KeyboardInterrupt  # there is no layout to keep
         checked = _check(run, held_out, is_hidden=threat == "hidden")
-        print_search(run, checked)
+        print_parts(search_answer(run, checked))
         if out is not None:
-            options = {
-                name: [*map(str, parameter)] if name == "start_from" else parameter
-                for name, parameter in context.params.items()
-                if name not in _NOT_OF_THE_SEARCH
-            }
-            options |= {"budget": run.result.budget, "surrogate": digest}
-            write_search(run, options, checked, out)
+            _write_search(run, _options(context, run, digest), checked, out)
     if run.result.interrupted:
         raise InterruptedCommandError(
             "the best layout so far was kept",
             "" if out is None else f"--start-from {out / LAYOUT_NAME} begins with it",
             resume_words(cache),
         )
+
+
+def _known_charge(scenario: Scenario, given: ChargeInput, seed: int) -> AnyCharge:
+    """Return the known charge, always drawn by the seed of the search."""
+    return given.fixed(scenario, scenario.sample_charge(np.random.default_rng(seed)))
+
+
+def _options(context: typer.Context, run: SearchRun, digest: str | None) -> dict[str, Any]:
+    """Return the options that the layout follows from."""
+    options = {
+        name: [*map(str, parameter)] if name == "start_from" else parameter
+        for name, parameter in context.params.items()
+        if name not in _NOT_OF_THE_SEARCH
+    }
+    return options | {"budget": run.result.budget, "surrogate": digest}
 
 
 def _method(
@@ -227,32 +232,14 @@ def _method(
     return search_by(guessing), guessing.digest
 
 
-@dataclass(frozen=True, eq=False)
-class SearchRun:
-    """A finished search.
-
-    Attributes:
-        problem: Its problem.
-        result: Its result.
-        seconds: Its duration.
-        cache_hits: Number of its loads found in the cache.
-    """
-
-    problem: DesignProblem
-    result: SearchResult
-    seconds: float
-    cache_hits: int
-
-
 def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> SearchRun:
     scenario, evaluator = problem.scenario, problem.evaluator
-    print_line(evaluator.engine.describe([scenario]))
-    turns = islice(cycle(problem.threats), budget)
-    costs = (evaluator.engine.cost(scenario, turn.charge) for turn in turns)
-    print_cost(cost for cost in costs if cost is not None)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+    engine, turns = evaluator.engine, islice(cycle(problem.threats), budget)
+    costs = (engine.cost(scenario, turn.charge) for turn in turns)
     hits, begun_s = evaluator.counts.cache_hits, perf_counter()
-    with progress_bar(f"{method.name} search in {scenario.name}") as progress:
+    label = f"{method.name} search in {scenario.name}"
+    with blasts_running(label, engine.describe([scenario]), costs) as progress:
 
         def report(state: Progress) -> None:
             best = "" if state.best is None else percent(state.best.reduction(problem))
@@ -289,46 +276,7 @@ def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | No
         )
 
 
-def print_search(run: SearchRun, checked: Evaluation | None) -> None:
-    """Print the effect of the layout on the search's threats and on others, and the cost."""
-    result, problem = run.result, run.problem
-    unprotected, load = (
-        problem.case.objective_value(problem.unprotected),
-        problem.load(result.layout),
-    )
-    number = partial(Number.load, problem.scenario.objective)
-    rows: list[tuple[AnyCell, ...]] = [
-        (
-            *("of the search", str(len(problem.threats)), number(unprotected), number(load)),
-            *(Number.share(reductions(load, unprotected).item()), "-"),
-        )
-    ]
-    if checked is not None:
-        rows.append(
-            (
-                *("held out", str(len(checked.threats))),
-                *(number(checked.unprotected_load), number(checked.load)),
-                Number.share(checked.mean_reduction),
-                interval(checked.reduction),
-            )
-        )
-    title = f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}"
-    print_table(title, ("threats", "number", "without", "with", "reduction", "95 % interval"), rows)
-    if checked is None:
-        print_line(
-            "no threat is held out: with this engine a charge is one blast, and the search used "
-            "every charge; `evaluate` takes other charges"
-        )
-    if result.by and not result.layout:
-        print_line(f"nothing is placed: {result.by}")
-    print_line(
-        f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "
-        f"blasts spent, {run.cache_hits} of the loads asked for known already; "
-        f"{run.seconds:.1f} s"
-    )
-
-
-def write_search(
+def _write_search(
     run: SearchRun, options: Mapping[str, Any], checked: Evaluation | None, out: Path
 ) -> None:
     """Write the layout and its picture; the history, its figure and the front, if there are any."""
@@ -391,18 +339,6 @@ def _provenance(
     }
 
 
-def _risk_text(problem: DesignProblem) -> str:
-    """Return the risk measure over the search's threats in words."""
-    noun = problem.scenario.objective.noun
-    words = f"{noun} of the protected structures"
-    risk = problem.case.risk or problem.scenario.objective.risk
-    if isinstance(risk, WorstRisk):
-        return f"largest {words}"
-    if isinstance(risk, ConditionalValueAtRisk):
-        return f"{words}, mean of the worst {100.0 * (1.0 - risk.level):.3g} %"
-    return f"mean {words}"
-
-
 def _package_proposal(
     scenario: Scenario, given: ChargeInput, cells: str | None, processes: int, out: Path | None
 ) -> tuple[DesignProblem, Layout]:
@@ -419,7 +355,7 @@ def _package_proposal(
         result = PackageProposer().propose(problem, report=report)
     ms = MS_PER_S * (perf_counter() - began_s)
     print_line(
-        f"{scenario.name}: {_proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
+        f"{scenario.name}: {proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
     )
     if out is not None:
         make_folder(out)
@@ -450,46 +386,21 @@ def _given_charge(scenario: Scenario, given: ChargeInput) -> AnyCharge | None:
     return charge
 
 
-def _proposal_words(scenario: Scenario, result: SearchResult) -> str:
-    """Return the proposal in words, with its cost and its expected gain."""
-    if not result.layout:
-        return "nothing is proposed"
-    placement = LayoutState.of(scenario, result.layout)
-    cost = "" if scenario.zone.budget is None else f", {scenario.zone.priced(placement.cost)}"
-    gain = result.expectation
-    return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
-
-
 def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
     """Print one row per layout by gas dynamics: no barrier, the rules by load, the proposal."""
     case, scenario = problem.case, problem.scenario
     engine = final_engine(JUDGE, [scenario], cells=cells)
     rules = layouts_by_rule(scenario, problem.known_charge)
-    layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
+    layouts: dict[str, Layout] = {"no barrier": (), "this proposal": layout, **rules}
     distinct = list(dict.fromkeys(layouts.values()))
-    print_line(engine.describe())
     named = {str(number): layout for number, layout in enumerate(distinct)}
-    print_cost(Campaign.on(scenario, named, case.threats, engine, engine.coarser).cost())
+    costs = Campaign.on(scenario, named, case.threats, engine, engine.coarser).cost()
+    label = f"{len(distinct) * len(case.threats)} blasts of gas dynamics"
     evaluators, found = Evaluators(engine), dict[Layout, Evaluation]()
-    with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
+    with blasts_running(label, engine.describe(), costs) as progress:
         for number, item in enumerate(distinct):
             share = share_of(progress, number, len(distinct))
             found[item] = compare(
                 evaluators, [case], [item], problem.processes, with_error=True, progress=share
             )
-    loads = {name: found[layout].load for name, layout in layouts.items()}
-    best_last = sorted(rules, key=lambda name: -loads[name])
-    rows: list[tuple[AnyCell, ...]] = []
-    for name in (_NOTHING, *best_last, _PROPOSAL):
-        own = found[layouts[name]]
-        share = Number.share(own.mean_reduction, own.reduction_error)
-        gone = "-" if name == _NOTHING else share.sampled_by(own.reduction, "charges", 0.01)
-        rows.append((name, Number.load(scenario.objective, loads[name], own.objective_error), gone))
-    charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
-    title = f"{scenario.name}: judged by gas dynamics on {charges}"
-    print_table(title, ("layout", "load", "reduction"), rows)
-    error = found[layout].grid_error
-    if error is not None:
-        print_line(cells_words(error))
-    if best_last and loads[best_last[-1]] < loads[_PROPOSAL]:
-        print_line(f"note: {best_last[-1]} does better here than the proposal")
+    print_outcome(judged_answer(scenario, layouts, found))

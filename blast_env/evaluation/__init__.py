@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from blast_env.evaluation.evaluate import compare, evaluate_layout
     from blast_env.evaluation.evaluator import (
         Assessment,
+        BlastCounts,
         BlastEvaluator,
         BudgetError,
         DesignProblem,
@@ -31,6 +32,7 @@ else:
 __all__ = [
     "CVAR_LEVEL",
     "Assessment",
+    "BlastCounts",
     "BlastEvaluator",
     "BlastKey",
     "BlastLoads",
