@@ -101,10 +101,10 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[LoadCase,
 def fixed_charges(scenario: AnyScenario) -> tuple[Charge, ...]:
     """Return the possible charges of a scenario whose sources are all points; otherwise none."""
     sources = find_scenario(scenario).charge
-    points = [each for each in sources if isinstance(each, PointSource)]
+    points = [source for source in sources if isinstance(source, PointSource)]
     if len(points) < len(sources):
         return ()
-    charges = (Charge(each.position_m, each.tnt_kg, each.height_m) for each in points)
+    charges = (Charge(point.position_m, point.tnt_kg, point.height_m) for point in points)
     return tuple(dict.fromkeys(charges))
 
 
@@ -167,7 +167,7 @@ class SeedRange(Enum):
     def draw_distinct(self, rng: np.random.Generator, count: int) -> list[int]:
         """Draw `count` seeds of the range, without replacement."""
         drawn = rng.choice(len(self.value), size=count, replace=False)
-        return [self.value.start + int(each) for each in drawn]
+        return [self.value.start + int(number) for number in drawn]
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ class LoadCaseSet:
     def charges_against(self, layout: Sequence[Element]) -> tuple[Charge, ...]:
         """Return `charges` at their places with a layout."""
         threats = self.threats[: len(self.charges)]
-        return tuple(each.charge_against(self.scenario, layout) for each in threats)
+        return tuple(threat.charge_against(self.scenario, layout) for threat in threats)
 
     @property
     def is_mean(self) -> bool:
@@ -293,7 +293,7 @@ def search_set(
     rng, found = generator(seed), find_scenario(scenario)
     drawn = [charge] if charge is not None else _spread_first(found.sample_charges(rng, charges))
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * len(drawn))
-    threats = tuple(LoadCase(drawn[k % len(drawn)], each) for k, each in enumerate(seeds))
+    threats = tuple(LoadCase(drawn[k % len(drawn)], item) for k, item in enumerate(seeds))
     return LoadCaseSet(found, threats, realisations, risk, charge, seed=seed)
 
 

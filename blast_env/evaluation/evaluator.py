@@ -408,14 +408,14 @@ class Assessment:
     def of(cls, case: LoadCaseSet, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
         """Return the assessment of a layout from its loads, one per threat of the case."""
         combined, counts = case.combined, case.scenario.objective
-        sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
+        sums = [s for load in loads if (s := load.protected_impulse_sim) is not None]
         return cls(
-            combined([each.protected_impulse_pa_s for each in loads]),
+            combined([load.protected_impulse_pa_s for load in loads]),
             combined(sums) if len(sums) == len(loads) else None,
-            combined([each.protected_peak_pa for each in loads]),
-            case.objective_value([each.load(counts) for each in loads], layout),
-            all(each.in_range for each in loads),
-            min([each.level for each in loads]) if counts.kind == "response" else None,
+            combined([load.protected_peak_pa for load in loads]),
+            case.objective_value([load.load(counts) for load in loads], layout),
+            all(load.in_range for load in loads),
+            min([load.level for load in loads]) if counts.kind == "response" else None,
         )
 
     @property
@@ -519,7 +519,7 @@ class DesignProblem:
 
     def _free(self, pairs: Sequence[tuple[Layout, LoadCase]]) -> list[float]:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
-        return [each.load(self.scenario.objective) for each in loads]
+        return [load.load(self.scenario.objective) for load in loads]
 
     def loads_with(self, layout: Sequence[Element]) -> list[BlastLoads]:
         """Return the loads with a layout, one per threat; errors as for `loads`."""

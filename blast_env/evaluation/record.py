@@ -100,7 +100,7 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
     Impulses are means over the area of the counted walls. Where the engine has no areas, the
     weights of the structures replace them.
     """
-    if all(each.building == each.name for each in loads):  # the usual case
+    if all(item.building == item.name for item in loads):  # the usual case
         return tuple(loads)
     parts: dict[str, list[StructureLoad]] = {}
     for load in loads:
@@ -116,21 +116,21 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
 
 def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     counted = counted_parts(parts)
-    areas_m2 = [each.area_m2 for each in counted if each.area_m2 is not None]
-    weights = [each.weight for each in counted]
+    areas_m2 = [part.area_m2 for part in counted if part.area_m2 is not None]
+    weights = [part.weight for part in counted]
     is_known = len(areas_m2) == len(counted)
-    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
-    impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
-    hit = [each.impulse_sim for each in parts if each.impulse_sim is not None]
+    peaks_pa = [part.peak_pa for part in counted if part.peak_pa is not None]
+    impulses_pa_s = np.array([part.impulse_pa_s for part in counted])
+    hit = [part.impulse_sim for part in parts if part.impulse_sim is not None]
     return replace(
         counted[0],
         name=name,
         weight=sum(weights),
         impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
         peak_pa=max(peaks_pa, default=None),
-        in_range=all(each.in_range for each in counted),
+        in_range=all(part.in_range for part in counted),
         area_m2=sum(areas_m2) if is_known else None,
-        validation=worst_validation(each.validation for each in counted),
+        validation=worst_validation(part.validation for part in counted),
         impulse_sim=sum(hit) if hit else None,
     )
 
@@ -166,7 +166,7 @@ class BlastLoads:
             raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
         responded = []
         for load in self.structures:
-            own = [each for each in self.bays if each.structure == load.name]
+            own = [bay for bay in self.bays if bay.structure == load.name]
             response, most = structure_response(own, named, objective)
             responded.append(replace(load, response=response, worst_damage=most))
         return replace(self, structures=tuple(responded))
@@ -202,11 +202,14 @@ class BlastLoads:
         """Return whether the bays and components are the scenario's, and the damage is finite."""
         if not scenario.objective.is_response:
             return not self.bays
-        known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
+        known = {
+            alternative.name: {*alternative.glazing, *alternative.wall}
+            for alternative in scenario.alternatives
+        }
         return bool(self.bays) and all(
-            known.get(each.name) == set(each.damage)
-            and np.isfinite([*each.damage.values(), each.area_m2, each.glazed_m2]).all()
-            for each in self.bays
+            known.get(bay.name) == set(bay.damage)
+            and np.isfinite([*bay.damage.values(), bay.area_m2, bay.glazed_m2]).all()
+            for bay in self.bays
         )
 
     @cached_property
@@ -222,7 +225,7 @@ class BlastLoads:
     @property
     def protected_impulse_pa_s(self) -> float:
         """Weighted sum of the impulses of the protected buildings, Pa*s."""
-        return sum([each.weight * each.impulse_pa_s for each in self._buildings])
+        return sum([building.weight * building.impulse_pa_s for building in self._buildings])
 
     @property
     def protected_impulse_sim(self) -> float | None:
@@ -241,7 +244,7 @@ class BlastLoads:
 
     def load(self, objective: ObjectiveSection) -> float:
         """Return the load of the protected structures that an objective selects, in its unit."""
-        impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
+        impulse_pa_s = {building.name: building.impulse_pa_s for building in self._buildings}
         return sum(
             [
                 objective.load(
@@ -269,14 +272,14 @@ def structure_response(
     `bays` has their damage with each of their possible components, `named` the components of all
     bays.
     """
-    chosen = {each.bay.name: each for each in named}
+    chosen = {item.bay.name: item for item in named}
     is_glazing = objective.measure == "glazing"
     damage, area_m2 = [], []
-    for each in bays:
-        bay = chosen[each.name]
+    for item in bays:
+        bay = chosen[item.name]
         names = (bay.glazing,) if is_glazing else (bay.glazing, bay.wall)
-        damage.append(worst(each.damage[name] for name in names if name is not None))
-        area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
+        damage.append(worst(item.damage[name] for name in names if name is not None))
+        area_m2.append(item.glazed_m2 if is_glazing else item.area_m2)
     return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
 
 
@@ -327,11 +330,11 @@ def parts_digest(scenario: Scenario) -> str:
     response is computed from the histories.
     """
     zone = scenario.build_zone
-    items = [] if zone is None else [each.model_dump(mode="json") for each in zone.items]
+    items = [] if zone is None else [item.model_dump(mode="json") for item in zone.items]
     structures = [
-        (each.name, each.building_name, each.facade and _division(each.facade))
-        for each in scenario.structures
-        if each.building_name != each.name or each.facade is not None
+        (structure.name, structure.building_name, structure.facade and _division(structure.facade))
+        for structure in scenario.structures
+        if structure.building_name != structure.name or structure.facade is not None
     ]
     if not (items or structures):
         return ""
@@ -494,7 +497,9 @@ class BlastRecord:
             self.time_s.astype("<f8"),
             self.pressure_pa.astype("<f4"),  # as they were recorded
         )
-        return b"\n".join((_HEADER.dump_json(header), b"".join(each.tobytes() for each in arrays)))
+        return b"\n".join(
+            (_HEADER.dump_json(header), b"".join(array.tobytes() for array in arrays))
+        )
 
     @classmethod
     def decoded(cls, content: bytes) -> Self:

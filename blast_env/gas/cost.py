@@ -158,7 +158,9 @@ def _cost_of_adaptive(
         depth_m + 2.0 * (settings.margin_m + block_m),
         height_m + block_m,
     )
-    walls_m2 = sum(_walls_m2(each.rectangle_m, each.height_m) for each in site.structures)
+    walls_m2 = sum(
+        _walls_m2(structure.rectangle_m, structure.height_m) for structure in site.structures
+    )
     watched = watched_structures(site, settings.until)
     reach_m = DETOUR * SOUND_M_S * sound_s(site, corners_m(site, watched))
     steps = large = at_walls = along = 0.0
@@ -168,7 +170,7 @@ def _cost_of_adaptive(
         step_s = settings.smallest_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
         own_steps = part_s / step_s
         steps += own_steps
-        x_m, y_m = (min(each, 2.0 * (front_m + block_m)) for each in most_m[:2])
+        x_m, y_m = (min(extent_m, 2.0 * (front_m + block_m)) for extent_m in most_m[:2])
         z_m = min(most_m[2], front_m + block_m)
         large += own_steps / 2.0 ** (count - 1) * x_m * y_m * z_m / largest_m**3
         passed = min(2.0 * front_m / max(width_m, depth_m), 1.0)
@@ -220,8 +222,8 @@ def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
     if not costs:
         return "nothing to run: all results are available"
     blasts = "a blast" if len(costs) == 1 else f"{len(costs)} blasts"
-    seconds = sum(each.seconds for each in costs) + drawn * _DRAWING_S
-    memory_gb = max(each.memory_bytes for each in costs) / 1e9
+    seconds = sum(cost.seconds for cost in costs) + drawn * _DRAWING_S
+    memory_gb = max(cost.memory_bytes for cost in costs) / 1e9
     return f"{blasts} of gas: about {time_words(seconds)} on a busy core, {memory_gb:.1f} GB"
 
 

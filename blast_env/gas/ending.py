@@ -84,4 +84,4 @@ def corners_m(site: BlastSite, structures: Sequence[int]) -> list[tuple[float, f
 def _boxes_m(site: BlastSite, structure: int) -> Sequence[Rectangle]:
     """Return the rectangle of a structure, or those around the walls of a polygon."""
     outline = site.structures[structure]
-    return [each.bounds_m for each in outline.walls] or [outline.rectangle_m]
+    return [wall.bounds_m for wall in outline.walls] or [outline.rectangle_m]

@@ -149,7 +149,7 @@ class GasRun:
         self.end_reason: EndReason | None = None
         self._groups = _groups(self.table, site, settings.until, watched)
         self._watches_gauges = settings.until == "gauges" and self.gauges is not None
-        places_m = [each.position_m for each in site.gauges] if self._watches_gauges else []
+        places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []
         self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
         self._end_s: float | None = None
         asked_s = settings.until_s
@@ -245,7 +245,7 @@ class GasRun:
         """Whether the load of each gauge is known (n,)."""
         if self.gauges is None:
             return np.empty(0, dtype=bool)
-        come_s = np.array([sound_s(self.site, [each.position_m]) for each in self.site.gauges])
+        come_s = np.array([sound_s(self.site, [gauge.position_m]) for gauge in self.site.gauges])
         known = is_known(self.gauges.impulse_pa_s, self.gauges.net_impulse_pa_s)
         return known & (self.solver.time_s >= come_s)
 
@@ -292,11 +292,11 @@ def _watched_boxes(site: BlastSite, until: str | float) -> list[Rectangle]:
     """Return the rectangles of the structures that a run waits for, of the barrier and gauges."""
     watched = set(watched_structures(site, until))
     boxes = [
-        each.rectangle_m
-        for k, each in enumerate(site.structures)
-        if k in watched or each.is_barrier
+        structure.rectangle_m
+        for k, structure in enumerate(site.structures)
+        if k in watched or structure.is_barrier
     ]
-    places = (each.position_m for each in site.gauges)
+    places = (gauge.position_m for gauge in site.gauges)
     return boxes + [Rectangle(x, y, x, y) for x, y, _ in places]
 
 
@@ -384,7 +384,7 @@ def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
     for end_m, (whole_m, of_cells_m) in zip(ends_m, both, strict=True):
         end_m[...] = air_height_m if whole_m is None else whole_m
         if outline.cells is not None and of_cells_m is not None:
-            known_m = [air_height_m if each is None else each for each in of_cells_m]
+            known_m = [air_height_m if cell_m is None else cell_m for cell_m in of_cells_m]
             end_m[tuple(np.array(outline.cells).T)] = known_m
     return ends_m
 
@@ -398,7 +398,9 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
     for index, outline in enumerate(site.structures):
         rows, columns = _modules_at(outline, grid)
         here = np.flatnonzero(rows[behind[:2]] >= 0)
-        of_row, of_column = (each[behind[0][here], behind[1][here]] for each in (rows, columns))
+        of_row, of_column = (
+            indices[behind[0][here], behind[1][here]] for indices in (rows, columns)
+        )
         base_m, top_m = _ends_m(outline, site.air_height_m)[:, of_row, of_column]
         inside = (base_m <= z_m[here]) & (z_m[here] < top_m)
         own = here[inside]
@@ -429,9 +431,9 @@ def _assign_walls(table: FaceTable, index: int, footprint: "Footprint") -> None:
     own = np.flatnonzero((table.structure == index) & (table.face < len(WALLS)))
     places_m = table.centre_m[own, :2]
     table.wall[own], table.share[own] = footprint.walls_of(places_m, table.outward[own])
-    sides = np.array([WALLS.index(each.side) for each in footprint.walls])
+    sides = np.array([WALLS.index(wall.side) for wall in footprint.walls])
     table.face[own] = sides[table.wall[own]]
-    table.outward[own] = np.array([each.normal for each in footprint.walls])[table.wall[own]]
+    table.outward[own] = np.array([wall.normal for wall in footprint.walls])[table.wall[own]]
 
 
 def _groups(
@@ -450,7 +452,7 @@ def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
     """Return the gauges, each in the nearest cell of air."""
     if not site.gauges:
         return None
-    return Gauges(grid, [_air_cell(grid, each.name, each.position_m) for each in site.gauges])
+    return Gauges(grid, [_air_cell(grid, gauge.name, gauge.position_m) for gauge in site.gauges])
 
 
 def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge, radius_m: float) -> None:

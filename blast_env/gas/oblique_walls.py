@@ -36,9 +36,10 @@ STEPPED: Final = (
 def stepped_buildings(structures: Iterable[AnyStructure]) -> frozenset[str]:
     """Return the names of the buildings with an oblique wall."""
     return frozenset(
-        each.building_name
-        for each in structures
-        if each.footprint is not None and any(wall.is_oblique for wall in each.footprint.walls)
+        structure.building_name
+        for structure in structures
+        if structure.footprint is not None
+        and any(wall.is_oblique for wall in structure.footprint.walls)
     )
 
 
@@ -67,7 +68,7 @@ class ObliqueLoads:
         from blast_env.gas.probes import PatchHistories
 
         bay = np.full(len(run.table.faces), -1)
-        by_name = {each.name: each for each in structures}
+        by_name = {structure.name: structure for structure in structures}
         for index, outline in enumerate(run.site.structures):
             for number, wall in enumerate(outline.walls):
                 own = np.flatnonzero((run.table.structure == index) & (run.table.wall == number))
@@ -103,8 +104,8 @@ class ObliqueLoads:
 
     def table(self, faces: "pd.DataFrame") -> "pd.DataFrame":
         """Return a `face_table` with the loads on oblique walls along the normal of the wall."""
-        columns = [each for each in map(str, faces) if each.endswith("_pa_s")]
-        changed = {each: self.along_normals(faces[each].to_numpy()) for each in columns}
+        columns = [face for face in map(str, faces) if face.endswith("_pa_s")]
+        changed = {column: self.along_normals(faces[column].to_numpy()) for column in columns}
         peaks = self.peaks_pa(faces["peak_pa"].to_numpy())
         return faces.assign(**changed, peak_pa=peaks)
 

@@ -112,7 +112,7 @@ class GasSettings:
     def __post_init__(self) -> None:
         """Check the arguments."""
         if self.cells not in CELLS:
-            known = ", ".join(repr(each) for each in CELLS)
+            known = ", ".join(repr(item) for item in CELLS)
             raise BlastEnvError(f"cells is {value_text(self.cells)}, must be one of {known}")
         cell_m = finite_number("cell_m", self.cell_m)
         cells = MODULE_SIDE_M / cell_m if cell_m >= _LEAST_CELL_M else 0.0
@@ -196,6 +196,6 @@ def _seconds(until: object) -> float:
     except (ValueError, BlastEnvError):
         seconds = nan
     if not 0.0 < seconds < inf:
-        known = ", ".join(repr(each) for each in _WAITED_FOR)
+        known = ", ".join(repr(name) for name in _WAITED_FOR)
         raise BlastEnvError(f"until is {value_text(until)}, must be {known} or seconds above 0")
     return seconds

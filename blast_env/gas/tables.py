@@ -154,7 +154,7 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
     """Group faces: area means of impulses, largest peaks, first arrivals."""
     means = ["impulse_pa_s", "known"]
-    weighed = faces.assign(**{each: faces[each] * faces["share"] for each in means})
+    weighed = faces.assign(**{mean: faces[mean] * faces["share"] for mean in means})
     groups: Any = weighed.groupby(keys, sort=False, observed=True)
     table: pd.DataFrame = groups.agg({"peak_pa": "max", "arrival_s": "min"})
     area = groups["share"].sum()
@@ -195,7 +195,7 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
         run: The run.
         faces: Its `face_table`, whose column `share` is the area ratio of real wall to face.
     """
-    counting = {each.name: each.faces for each in run.site.structures if not each.is_barrier}
+    counting = {item.name: item.faces for item in run.site.structures if not item.is_barrier}
     own = faces[faces["structure"].isin(list(counting))]
     table = _grouped(run, own, ["structure", "face"])
     walls = zip(table["structure"], table["face"], strict=True)
@@ -246,18 +246,18 @@ def _structure_row(
     """Return the combined loads on the counted walls of structures."""
     counted = counted_parts(parts)
     structure, face = faces["structure"], faces["face"]
-    counting = [(structure == each.name) & face.isin(each.faces) for each in counted]
+    counting = [(structure == part.name) & face.isin(part.faces) for part in counted]
     walls = faces[np.logical_or.reduce(counting)]
-    roof = faces[structure.isin([each.name for each in counted]) & (face == ROOF)]
+    roof = faces[structure.isin([part.name for part in counted]) & (face == ROOF)]
     of_walls = means_by_wall(walls, "impulse_pa_s")
     return {
         "structure": name,
         "building": name,
-        "parts": " ".join(each.name for each in parts),
-        "protected": any(each.protected for each in parts),
-        "weight": sum(each.weight for each in counted),
-        "height_m": max(each.height_m or run.site.air_height_m for each in parts),
-        "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in counted)),
+        "parts": " ".join(part.name for part in parts),
+        "protected": any(part.protected for part in parts),
+        "weight": sum(part.weight for part in counted),
+        "height_m": max(part.height_m or run.site.air_height_m for part in parts),
+        "faces": " ".join(wall for wall in WALLS if any(wall in part.faces for part in counted)),
         "area_m2": walls["share"].sum() * run.grid.cell_m**2,
         "impulse_pa_s": _mean_load(walls, "impulse_pa_s"),
         "peak_pa": walls["peak_pa"].max(),
@@ -278,7 +278,7 @@ def gauge_table(run: "GasRun") -> "pd.DataFrame":
         return table_of([], GAUGE_COLUMNS)
     loads = load_values(gauges)
     centres = np.array(run.grid.origin_m) + run.grid.cell_m * (gauges.cells + 0.5)
-    frame = pd.DataFrame({"name": [each.name for each in run.site.gauges], **loads})
+    frame = pd.DataFrame({"name": [gauge.name for gauge in run.site.gauges], **loads})
     frame[["x_m", "y_m", "z_m"]] = centres
     frame["known"] = run.gauges_known
     return frame[[column.name for column in GAUGE_COLUMNS]]

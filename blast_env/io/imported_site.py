@@ -24,15 +24,15 @@ def imported_plan(imported: ImportedSite) -> Figure:
     North is marked, and each building has its name and the deviation of its modules.
     """
     site, name = imported.site, imported.scenario.name
-    worst = max(imported.buildings, key=lambda each: each.deviation.outline_m)
+    worst = max(imported.buildings, key=lambda building: building.deviation.outline_m)
     words = (
         f"{site.path.name}, turned by {site.rotation_deg:.1f}°; modules at most "
         f"{worst.deviation.outline_m:.2f} m from an outline ({worst.name})"
     )
     outlines = [
-        Feature(_ON_MAP, tuple(ring.coords[:-1]), each.name)
-        for each in imported.buildings
-        for ring in shapely.get_rings(shapely.get_parts(each.outline))
+        Feature(_ON_MAP, tuple(ring.coords[:-1]), building.name)
+        for building in imported.buildings
+        for ring in shapely.get_rings(shapely.get_parts(building.outline))
     ]
     features = list(_features(imported))
     figure = plan_figure(imported.scenario, features, legend_of(outlines), (name, words))
@@ -43,9 +43,9 @@ def imported_plan(imported: ImportedSite) -> Figure:
 def _features(imported: ImportedSite) -> Iterator[Feature]:
     """Yield the features of the site, buildings as modules with the deviation in the label."""
     deviations = {
-        part: f"{each.deviation.area_share:.1%}, {each.deviation.outline_m:.2f} m"
-        for each in imported.buildings
-        for part in each.part_names
+        part: f"{building.deviation.area_share:.1%}, {building.deviation.outline_m:.2f} m"
+        for building in imported.buildings
+        for part in building.part_names
     }
     for feature in site_features(imported.scenario):
         if feature.name not in deviations:

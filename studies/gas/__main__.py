@@ -267,21 +267,21 @@ def refinement(
 ) -> None:
     """Print loads, cost and memory of choices of cells, over those of the last one."""
     with user_errors():
-        engines = [engine_with(each) for each in sizes.split(",")]
+        engines = [engine_with(size) for size in sizes.split(",")]
         rows = []
         for name in scenario or ["courtyard", "street_front"]:
             site = street(_STREET_M) if name == LARGE else load_scenario(name)
-            found = [compare_cells(site, each) for each in engines]
-            for each in found:
-                for load, wanted in zip(each.loads, found[-1].loads, strict=True):
+            found = [compare_cells(site, row) for row in engines]
+            for row in found:
+                for load, wanted in zip(row.loads, found[-1].loads, strict=True):
                     rows.append(
                         (
-                            *(name, load.name, each.cells),
+                            *(name, load.name, row.cells),
                             f"{load.impulse_pa_s / wanted.impulse_pa_s:.3f}",
                             f"{load.peak_pa / wanted.peak_pa:.3f}",
-                            f"{1e-6 * each.cell_updates:.0f}",
-                            f"{each.cpu_s:.1f}",
-                            f"{each.memory_mb:.0f}",
+                            f"{1e-6 * row.cell_updates:.0f}",
+                            f"{row.cpu_s:.1f}",
+                            f"{row.memory_mb:.0f}",
                         )
                     )
         headers = ("site", "structure", "cells", "load", "peak", "million cell updates")

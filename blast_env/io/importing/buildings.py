@@ -73,8 +73,8 @@ def prepared(site: PlacedSite) -> PlacedSite:
     Raises:
         BlastEnvError: If an outline is not sound, and may not be or cannot be repaired.
     """
-    others = [each for each in site.things if each.role is not Role.BUILDING]
-    buildings = [_sound(site, each) for each in site.of_role(Role.BUILDING)]
+    others = [thing for thing in site.things if thing.role is not Role.BUILDING]
+    buildings = [_sound(site, thing) for thing in site.of_role(Role.BUILDING)]
     buildings = without_doubles(buildings, site.ledger)
     buildings = on_the_ground(buildings, site.options.level_height_m, site.ledger)
     buildings = _with_heights(site, _with_parts(site, buildings))
@@ -111,14 +111,14 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
     Parts that are small or without a height of their own are not kept; a building without a height
     has that of its lowest part. A part without a building is one.
     """
-    wholes = [each for each in things if not each.is_part]
-    tree = shapely.STRtree([each.geometry for each in wholes])
+    wholes = [thing for thing in things if not thing.is_part]
+    tree = shapely.STRtree([item.geometry for item in wholes])
     parts: dict[int, list[Thing]] = {}
     found = []
     for part in things:
         if not part.is_part:
             continue
-        own = next((k for k, each in enumerate(wholes) if each.place == part.part_of), None)
+        own = next((k for k, item in enumerate(wholes) if item.place == part.part_of), None)
         own = _building_of(part, wholes, tree) if own is None else own
         if own is None:
             found.append(replace(part, is_part=False))
@@ -129,7 +129,9 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
             parts.setdefault(own, []).append(part)
     for index, whole in enumerate(wholes):
         own_parts = parts.get(index, [])
-        lowest_m = min((each.height_m for each in own_parts if each.height_m), default=None)
+        lowest_m = min(
+            (own_part.height_m for own_part in own_parts if own_part.height_m), default=None
+        )
         if lowest_m is not None and whole.height_m is None:
             kind, detail = "heights of buildings with parts", f"{lowest_m:g} m, as the lowest"
             site.ledger.add(Fate.GUESSED, kind, whole.place, whole.name, detail)
@@ -137,8 +139,10 @@ def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
         group = whole.part_of or (whole.place if own_parts else "")
         found.append(replace(whole, part_of=group))
         found += [
-            replace(each, part_of=group, protected=whole.protected, name=each.name or whole.name)
-            for each in own_parts
+            replace(
+                own_part, part_of=group, protected=whole.protected, name=own_part.name or whole.name
+            )
+            for own_part in own_parts
         ]
     return found
 
@@ -167,11 +171,15 @@ def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
     begins there where they overlap.
     """
     order = sorted(
-        (each for each in things if not each.carries),
-        key=lambda each: (-bool(each.is_part), -(each.height_m or 0.0), -each.geometry.area),
+        (item for item in things if not item.carries),
+        key=lambda building: (
+            -bool(building.is_part),
+            -(building.height_m or 0.0),
+            -building.geometry.area,
+        ),
     )
-    tree = shapely.STRtree([each.geometry for each in order])
-    found = [each for each in things if each.carries]
+    tree = shapely.STRtree([building.geometry for building in order])
+    found = [item for item in things if item.carries]
     left = list(order)
     for k, thing in enumerate(order):
         shape = thing.geometry
@@ -186,13 +194,13 @@ def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
                 found += _filled(thing, order[index], left, index)
         if cut:
             kind = "parts above their building" if cut[0].is_part else "buildings over buildings"
-            detail = f"by {', '.join(each.place for each in cut)}"
+            detail = f"by {', '.join(part.place for part in cut)}"
             fate, outcome = Fate.CUT, "overlap left out"
             if shape.area < least_m2:
                 fate, outcome, shape = Fate.MERGED, "covered", shapely.Polygon()
             site.ledger.add(fate, f"{kind}, {outcome}", thing.place, thing.name, detail)
         left[k] = replace(thing, geometry=shape)
-    return [*found, *(each for each in left if not each.geometry.is_empty)]
+    return [*found, *(building for building in left if not building.geometry.is_empty)]
 
 
 def _overlap(one: Thing, other: Thing) -> bool:
@@ -269,8 +277,8 @@ class _Guess:
 
     def __init__(self, buildings: Sequence[Thing], options: ImportOptions) -> None:
         self._options = options
-        self._known = [each for each in buildings if each.height_m is not None]
-        self._tree = shapely.STRtree([each.geometry for each in self._known])
+        self._known = [building for building in buildings if building.height_m is not None]
+        self._tree = shapely.STRtree([building.geometry for building in self._known])
 
     def of(self, thing: Thing) -> tuple[float, str, str]:
         """Return a height, m, with the kind of the guess and its words."""
@@ -294,13 +302,17 @@ class _Guess:
         if thing.kind in _GENERAL and thing.geometry.area < _SMALL_M2:
             yield level_m, level_m, "as a small building"
         near = self._near(thing)
-        alike = [each.height_m for each in near if each.kind == thing.kind and each.height_m]
+        alike = [
+            building.height_m
+            for building in near
+            if building.kind == thing.kind and building.height_m
+        ]
         if len(alike) >= _LEAST_NEIGHBOURS:
             yield (*_middle(alike), f"as {len(alike)} neighbours")
         storeys = _STOREYS.get(thing.kind)
         if storeys is not None:
             yield storeys[0] * level_m, storeys[1] * level_m, "by its kind"
-        around = [each.height_m for each in near if each.height_m]
+        around = [building.height_m for building in near if building.height_m]
         if len(around) >= _LEAST_NEIGHBOURS:
             yield (*_middle(around), f"as {len(around)} neighbours")
         yield _USUAL[0] * level_m, _USUAL[1] * level_m, "as usual"
@@ -309,7 +321,7 @@ class _Guess:
         """Return the buildings of known height around one, the nearest first."""
         around = self._tree.query(thing.geometry, "dwithin", distance=_NEIGHBOUR_M)
         near = [self._known[index] for index in around]
-        near.sort(key=lambda each: float(each.geometry.distance(thing.geometry)))
+        near.sort(key=lambda building: float(building.geometry.distance(thing.geometry)))
         return near[:_MOST_NEIGHBOURS]
 
 

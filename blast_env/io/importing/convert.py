@@ -78,9 +78,9 @@ class ImportedSite:
         if self.scenario.build_zone is not None:
             ground = shapely.box(*self.scenario.build_zone.rectangle_m)
             streets = [
-                shapely.LineString(each.segment_m)
-                for each in self.scenario.charge
-                if isinstance(each, SegmentSource)
+                shapely.LineString(source.segment_m)
+                for source in self.scenario.charge
+                if isinstance(source, SegmentSource)
             ]
             over = int(np.sum(shapely.intersects(streets, ground)))
             words = f"the build zone lies over {over} parts of streets: barriers may stand there"
@@ -97,7 +97,7 @@ class ImportedSite:
             "scenario": self.scenario.name,
             "scenario_hash": self.scenario.content_hash,
             "georeference": None if georeference is None else georeference.model_dump(),
-            "buildings": [each.record for each in self.buildings],
+            "buildings": [building.record for building in self.buildings],
             "charges": len(self.scenario.charge),
             "notes": list(self.notes),
             "ledger": self.ledger.record,
@@ -139,7 +139,7 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     site_map.settle(
         {
             **dict.fromkeys(streets, str(Role.CHARGE)),
-            **{each.place: str(Role.BUILDING) for each in buildings},
+            **{item.place: str(Role.BUILDING) for item in buildings},
             **_others(site, buildings),
         }
     )
@@ -151,7 +151,7 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",
         "description": _description(site_map, site, buildings),
-        "import_notes": [STEERING.sub(" ", each) for each in notes],
+        "import_notes": [STEERING.sub(" ", note) for note in notes],
         "site": {"width_m": site.size_m[0], "height_m": site.size_m[1]},
         "charge": sources,
         "structures": [part for building in buildings for part in _structures(building, buildings)],
@@ -169,21 +169,21 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
 def _others(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> dict[str, str]:
     """Return the roles of the outlines and texts that are used, by their places in the file."""
     options = site.options
-    built = shapely.union_all([each.outline for each in buildings])
+    built = shapely.union_all([thing.outline for thing in buildings])
     used = {}
-    for each in site.things:
-        if each.role in (Role.BUILDING, Role.CHARGE):
+    for thing in site.things:
+        if thing.role in (Role.BUILDING, Role.CHARGE):
             continue
-        if each.role is Role.NAME:
-            is_used, why = bool(shapely.intersects(each.geometry, built)), "texts beside buildings"
-        elif each.role is Role.ZONE and (options.zone_m or options.zone_around_m):
+        if thing.role is Role.NAME:
+            is_used, why = bool(shapely.intersects(thing.geometry, built)), "texts beside buildings"
+        elif thing.role is Role.ZONE and (options.zone_m or options.zone_around_m):
             is_used, why = False, "zones of the map, for another is asked for"
         else:
-            is_used, why = bool(shapely.intersects(each.geometry, site.box)), OUTSIDE
+            is_used, why = bool(shapely.intersects(thing.geometry, site.box)), OUTSIDE
         if is_used:
-            used[each.place] = str(each.role)
+            used[thing.place] = str(thing.role)
         else:
-            site.ledger.add(Fate.PASSED, why, each.place, each.name)
+            site.ledger.add(Fate.PASSED, why, thing.place, thing.name)
     return used
 
 
@@ -210,7 +210,9 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read, is too large, or has an unknown suffix.
     """
-    reader = next((_READERS[each] for each in _READERS if path.name.lower().endswith(each)), None)
+    reader = next(
+        (_READERS[suffix] for suffix in _READERS if path.name.lower().endswith(suffix)), None
+    )
     if reader is None:
         known = ", ".join(_READERS)
         raise BlastEnvError(
@@ -230,12 +232,12 @@ def _structures(
     building: FittedBuilding, buildings: tuple[FittedBuilding, ...]
 ) -> list[dict[str, Any]]:
     """Return the structures of a building; with its parts they have a total weight of 1."""
-    group = [each for each in buildings if each.group == building.group]
-    walls = [(each, part.polygon.length) for each in group for part in each.polygons]
-    whole = sum(length_m * each.wall_height_m for each, length_m in walls)
+    group = [polygon for polygon in buildings if polygon.group == building.group]
+    walls = [(polygon, part.polygon.length) for polygon in group for part in polygon.polygons]
+    whole = sum(length_m * polygon.wall_height_m for polygon, length_m in walls)
     parts = []
-    for name, each in zip(building.part_names, building.polygons, strict=True):
-        outline, *courtyards = ([list(place) for place in ring] for ring in each.rings)
+    for name, polygon in zip(building.part_names, building.polygons, strict=True):
+        outline, *courtyards = ([list(place) for place in ring] for ring in polygon.rings)
         part: dict[str, Any] = {
             "kind": "polygon",
             "name": name,
@@ -248,7 +250,7 @@ def _structures(
             part["title"] = STEERING.sub(" ", building.title)[:MOST_TITLE]
         if len(walls) > 1:
             part["building"] = group[0].name
-            part["weight"] = round(each.polygon.length * building.wall_height_m / whole, 6)
+            part["weight"] = round(polygon.polygon.length * building.wall_height_m / whole, 6)
         if building.height_m is not None:
             part["height_m"] = building.height_m
         if building.base_m:
@@ -273,24 +275,24 @@ def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
     """Return the windows of a model, with panes of a common glass."""
     glass = catalogue()[_GLASS].model_dump(mode="json", exclude_none=True)
     return {
-        _window_of(each): {
+        _window_of(building): {
             **glass,
-            "title": f"window of {each.title or each.name}"[:MOST_TITLE],
-            "width_m": each.facade["width"],
-            "height_m": each.facade["height"],
-            "sill_m": each.facade["sill"],
+            "title": f"window of {building.title or building.name}"[:MOST_TITLE],
+            "width_m": building.facade["width"],
+            "height_m": building.facade["height"],
+            "sill_m": building.facade["sill"],
         }
-        for each in buildings
-        if each.facade
+        for building in buildings
+        if building.facade
     }
 
 
 def _description(site_map: SiteMap, site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
     digest = hashlib.sha256(site_map.content).hexdigest()[:_HASH_DIGITS]
-    worst = max(buildings, key=lambda each: each.deviation.area_share)
-    farthest = max(buildings, key=lambda each: each.deviation.outline_m)
-    protected = ", ".join(each.name for each in buildings if each.protected)
+    worst = max(buildings, key=lambda building: building.deviation.area_share)
+    farthest = max(buildings, key=lambda building: building.deviation.outline_m)
+    protected = ", ".join(building.name for building in buildings if building.protected)
     text = (
         f"Imported from {site.path.name} (SHA-256 {digest}...) by blast-env {package_version()}: "
         f"{len(buildings)} buildings, protected: {protected}. The site's x "
@@ -327,15 +329,15 @@ def sketch_of(path: Path, options: ImportOptions) -> MapSketch:
         BlastEnvError: If it cannot be read, or has no building.
     """
     site_map = read_map(path, options)
-    things = [each for each in things_of(site_map) if each.role is Role.BUILDING]
-    areas = [each.geometry for each in things if not each.fault]
-    parts = [each for each in shapely.get_parts(areas) if each.geom_type == "Polygon"]
+    things = [thing for thing in things_of(site_map) if thing.role is Role.BUILDING]
+    areas = [thing.geometry for thing in things if not thing.fault]
+    parts = [part for part in shapely.get_parts(areas) if part.geom_type == "Polygon"]
     if not parts:
         raise BlastEnvError(f"{path}: has no building; define them with --buildings-from")
     left, bottom, right, top = shapely.total_bounds(parts)
-    parts.sort(key=lambda each: -float(each.area))
+    parts.sort(key=lambda part: -float(part.area))
     detail = _SKETCH_DETAIL * max(right - left, top - bottom)
-    rings = [shapely.simplify(each.exterior, detail).coords[:-1] for each in parts[:_MOST_SKETCHED]]
+    rings = [shapely.simplify(part.exterior, detail).coords[:-1] for part in parts[:_MOST_SKETCHED]]
     is_map = site_map.crs is not None and CRS(site_map.crs).is_geographic
     stretch = cos(radians(0.5 * (bottom + top))) if is_map else 1.0
     return MapSketch(tuple(tuple((x, y) for x, y in ring) for ring in rings), stretch)

@@ -27,8 +27,11 @@ def without_doubles(buildings: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     found, gone = list(buildings), set[int]()
     usable = [
         k
-        for k, each in enumerate(found)
-        if not each.is_part and not each.carries and each.geometry.area and each.geometry.is_valid
+        for k, outline in enumerate(found)
+        if not outline.is_part
+        and not outline.carries
+        and outline.geometry.area
+        and outline.geometry.is_valid
     ]
     shapes = np.array([found[k].geometry for k in usable], dtype=object)
     for first, second in sorted(shapely.STRtree(shapes).query(shapes, "intersects").T.tolist()):
@@ -44,7 +47,7 @@ def without_doubles(buildings: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             Fate.MERGED, _TWICE, found[double].place, found[double].name, f"by {found[kept].place}"
         )
         found[kept] = _with_words_of(found[kept], found[double])
-    return [each for k, each in enumerate(found) if k not in gone]
+    return [outline for k, outline in enumerate(found) if k not in gone]
 
 
 def _may_be_one(one: Thing, other: Thing) -> bool:
@@ -56,7 +59,7 @@ def _may_be_one(one: Thing, other: Thing) -> bool:
 def _rank(shape: BaseGeometry) -> tuple[int, float]:
     """Return the number of parts and the area of courtyards: the larger outline of two stays."""
     parts = shapely.get_parts(shape)
-    return len(parts), sum(_filled(each).area - each.area for each in parts)
+    return len(parts), sum(_filled(part).area - part.area for part in parts)
 
 
 def _has_border(shape: BaseGeometry, double: BaseGeometry) -> bool:

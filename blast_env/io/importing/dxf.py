@@ -126,7 +126,7 @@ def _document(site_map: SiteMap) -> Drawing:
 
 def _note_layers(site_map: SiteMap, document: Drawing) -> None:
     """Enter the layers that are switched off, which are read as others."""
-    used = {str(each.tags["layer"]).lower() for each in site_map.features}
+    used = {str(feature.tags["layer"]).lower() for feature in site_map.features}
     for layer in document.layers:
         if layer.dxf.name.lower() in used and (layer.is_off() or layer.is_frozen()):
             kind = "layers that are off or frozen, read as others"
@@ -201,7 +201,7 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
         if isinstance(value, float):
             yield value
         elif isinstance(value, Vec2 | Vec3):
-            yield from (float(each) for each in value)
+            yield from (float(part) for part in value)
     if isinstance(entity, LWPolyline):
         yield from np.ravel(entity.lwpoints.values).tolist()
     elif isinstance(entity, Polyline):
@@ -268,7 +268,7 @@ class _Drawn:
                 own = handle if part is entity else f"{handle}/{number}"
                 place = f"{_kind(part)} {own} on the layer {named(layer)}"
                 if isinstance(part, Face3d) and not _is_hidden(part):
-                    corners = np.array([tuple(each) for each in part.wcs_vertices()])
+                    corners = np.array([tuple(wcs_vertex) for wcs_vertex in part.wcs_vertices()])
                     self._check(corners, place)
                     insert = "" if part is entity else handle
                     self.faces.setdefault((layer, insert), []).append((place, corners))
@@ -306,7 +306,7 @@ class _Drawn:
                 place = insert.matrix44()
                 for inner in block:
                     for part, own in self._parts(inner, layer):
-                        yield from ((each, own) for each in self._placed(part, place))
+                        yield from ((placed, own) for placed in self._placed(part, place))
         elif isinstance(entity, SupportsVirtualEntities):
             for part in virtual_entities(entity):
                 yield from self._parts(part, layer)
@@ -318,9 +318,9 @@ class _Drawn:
         if entity.dxftype() == "ATTDEF":
             return []  # the insert has the attribute
         faults, found = copies([entity], place)
-        if _rise(entity).any() and not all(each.dxf.is_supported("thickness") for each in found):
+        if _rise(entity).any() and not all(path.dxf.is_supported("thickness") for path in found):
             faults, found = copies(self._chords(entity, place), place)
-        self.skipped += [(each.entity, each.error.name.lower()) for each in faults]
+        self.skipped += [(fault.entity, fault.error.name.lower()) for fault in faults]
         return found
 
     def _chords(self, entity: DXFEntity, place: Matrix44) -> list[LWPolyline]:
@@ -333,7 +333,10 @@ class _Drawn:
         stretch = max(axis.magnitude for axis in (place.ux, place.uy, place.uz))
         sag = _SAG_M / self.site_map.unit_m / max(stretch, _ROUNDING)
         line = make_path(entity)
-        largest = max((abs(each) for point in line.control_vertices() for each in point), default=0)
+        largest = max(
+            (abs(coordinate) for point in line.control_vertices() for coordinate in point),
+            default=0,
+        )
         up = Vec3(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)))
         sag = max(sag, _LEAST_SAG * largest)
         return list(to_lwpolylines([line], distance=sag, extrusion=up, dxfattribs=given))
@@ -366,14 +369,14 @@ class _Drawn:
         """
         if _is_mesh(entity):
             mesh = make_primitive(entity).mesh
-            vertices = np.array([tuple(each) for each in mesh.vertices] if mesh else [])
+            vertices = np.array([tuple(vertex) for vertex in mesh.vertices] if mesh else [])
             self._check(vertices, place)
             faces = [vertices[list(face)] for face in mesh.faces] if mesh else []
             yield from self._body(faces, tags, place)
             return
         if isinstance(entity, Polygonal):
             entity.paths.paths = [
-                each for each in entity.paths if not each.path_type_flags & _AROUND_TEXT
+                path for path in entity.paths if not path.path_type_flags & _AROUND_TEXT
             ]
             rings = [self._places(line, place) for line in from_hatch(entity)]
             lines = [LineString([*ring[:, :2], ring[0, :2]]) for ring in rings if len(ring) > 2]
@@ -399,7 +402,7 @@ class _Drawn:
     def _body(self, corners: Sequence[FloatArray], tags: Tags, place: str) -> Iterator[MapFeature]:
         """Yield the parts of a body with these faces, each (k, 3)."""
         unit_m = self.site_map.unit_m
-        faces = Faces.of([unit_m * each for each in corners if len(each) > 2])
+        faces = Faces.of([unit_m * part for part in corners if len(part) > 2])
         shadow = faces.shadow if len(faces.plans) else _NOWHERE
         if shadow.is_empty:
             yield _shown(_NOWHERE, tags, place)
@@ -410,10 +413,10 @@ class _Drawn:
             return
         feet = list(faces.plans[faces.low_m <= low_m + LEAST_STOREY_M])
         parts = faces.parts(low_m, feet, self.site_map.options.least_area_m2, 0.0)
-        for each in parts or [BodyPart(shadow, low_m, high_m)]:
+        for part in parts or [BodyPart(shadow, low_m, high_m)]:
             part_of = place if len(parts) > 1 else ""
-            extent_m = each.base_m, each.top_m
-            outline = _in_units(each.outline, unit_m)
+            extent_m = part.base_m, part.top_m
+            outline = _in_units(part.outline, unit_m)
             yield MapFeature(outline, tags, place, extent_m=extent_m, part_of=part_of)
 
     def _of_faces(
@@ -447,7 +450,7 @@ class _Drawn:
         self._check(held, place)
         largest = float(np.abs(held).max(initial=0.0))
         straight = line.flattening(max(_SAG_M / self.site_map.unit_m, _LEAST_SAG * largest))
-        points = np.array([tuple(each) for each in islice(straight, MOST_POINTS + 1)])
+        points = np.array([tuple(vertex) for vertex in islice(straight, MOST_POINTS + 1)])
         check_count(self.site_map.path, self.site_map.points + len(points), MOST_POINTS, "points")
         return points.reshape(-1, 3)
 

@@ -146,12 +146,12 @@ class FittedBuilding:
     @property
     def boxes_m(self) -> tuple[Rectangle, ...]:
         """The modules in rectangles, site metres."""
-        return tuple(box for each in self.polygons for box in each.boxes_m)
+        return tuple(box for polygon in self.polygons for box in polygon.boxes_m)
 
     @property
     def area_m2(self) -> float:
         """Area of the modules."""
-        return MODULE_SIDE_M**2 * sum(len(each.cells) for each in self.polygons)
+        return MODULE_SIDE_M**2 * sum(len(polygon.cells) for polygon in self.polygons)
 
 
 def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
@@ -164,20 +164,20 @@ def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
     kept = _kept(site)
     if not kept:
         raise _no_building(site)
-    kept.sort(key=lambda each: (each.carries, -each.geometry.area))
+    kept.sort(key=lambda thing: (thing.carries, -thing.geometry.area))
     fitted = []
-    for each, own in zip(kept, _polygons(kept), strict=True):
+    for thing, own in zip(kept, _polygons(kept), strict=True):
         if own:
-            fitted.append((each, own))
+            fitted.append((thing, own))
         else:
             kind = "buildings below others, or that cover the centre of no module"
-            site.ledger.add(Fate.LEFT_OUT, kind, each.place, each.name)
+            site.ledger.add(Fate.LEFT_OUT, kind, thing.place, thing.name)
     count = sum(len(own) for _, own in fitted)
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} structures, must take")
-    names = _names([each.name for each, _ in fitted])
+    names = _names([thing.name for thing, _ in fitted])
     buildings = [
-        _fitted(site, name, each, own) for name, (each, own) in zip(names, fitted, strict=True)
+        _fitted(site, name, thing, own) for name, (thing, own) in zip(names, fitted, strict=True)
     ]
     return _with_protected(site, buildings)
 
@@ -226,7 +226,7 @@ def _kept(site: PlacedSite) -> list[Thing]:
         BlastEnvError: If there are too many buildings, or their outlines are too long.
     """
     least_m2 = site.options.least_area_m2
-    outlines = np.array([each.geometry for each in site.of_role(Role.BUILDING)], dtype=object)
+    outlines = np.array([item.geometry for item in site.of_role(Role.BUILDING)], dtype=object)
     outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
     kept = []
     inside = shapely.intersection(outlines, site.box)
@@ -242,8 +242,8 @@ def _kept(site: PlacedSite) -> list[Thing]:
             kept.append((replace(thing, geometry=area), outline))
     if len(kept) > MOST_STRUCTURES:
         raise _too_many(site, f"there are {len(kept)} buildings on the site, must be")
-    check_outlines([each.geometry for each, _ in kept], f"{site.path}: the buildings")
-    return [replace(each, name=each.name or _written_in(site, whole)) for each, whole in kept]
+    check_outlines([item.geometry for item, _ in kept], f"{site.path}: the buildings")
+    return [replace(item, name=item.name or _written_in(site, whole)) for item, whole in kept]
 
 
 def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
@@ -257,7 +257,7 @@ def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
     """Return the text inside an outline of a drawing; an empty string unless it is unique."""
     texts = site.of_role(Role.NAME)
     shapely.prepare(outline)
-    inside = shapely.covers(outline, [each.geometry for each in texts])
+    inside = shapely.covers(outline, [text.geometry for text in texts])
     words = {texts[index].name for index in np.flatnonzero(inside)}
     return words.pop() if len(words) == 1 else ""
 
@@ -277,9 +277,9 @@ def _polygons(kept: Sequence[Thing]) -> list[tuple[Footprint, ...]]:
         apart.append(_beside(thing.geometry, shapely.union_all(others)))
     polygons: list[tuple[Footprint, ...]] = []
     for digits in _DIGITS:
-        polygons = [_footprints(each, digits) for each in apart]
+        polygons = [_footprints(part, digits) for part in apart]
         levels = (
-            [own for own, each in zip(polygons, kept, strict=True) if each.carries == carries]
+            [own for own, item in zip(polygons, kept, strict=True) if item.carries == carries]
             for carries in (False, True)
         )
         if not any(map(_overlap, levels)):
@@ -307,12 +307,12 @@ def _footprints(outline: BaseGeometry, digits: int) -> tuple[Footprint, ...]:
                 if shapely.Polygon(ring).area >= _LEAST_PART_M2
             ]
             found.append(footprint_of(rings[0], tuple(rings[1:])))
-    return tuple(each for each in found if each.cells)
+    return tuple(item for item in found if item.cells)
 
 
 def _overlap(buildings: Iterable[Sequence[Footprint]]) -> bool:
     """Return whether modules of buildings overlap."""
-    boxes = [shapely.box(*box) for own in buildings for each in own for box in each.boxes_m]
+    boxes = [shapely.box(*box) for own in buildings for part in own for box in part.boxes_m]
     area_m2 = float(shapely.area(boxes).sum())
     return bool(area_m2 > shapely.area(shapely.union_all(boxes)) + 0.5 * MODULE_SIDE_M**2)
 
@@ -365,22 +365,22 @@ def _with_protected(
     if site.options.protect_near is not None:
         chosen.add(_nearest(site, buildings, site.options.protect_near))
     if not chosen:
-        chosen = {index for index, each in enumerate(buildings) if each.protected}
+        chosen = {index for index, building in enumerate(buildings) if building.protected}
     if not chosen:
         raise BlastEnvError(
             "no building is protected: say --protect NAME or --protect-near X,Y; there are "
             f"{_listed(buildings)}"
         )
     groups = {buildings[index].group for index in chosen}
-    return tuple(replace(each, protected=each.group in groups) for each in buildings)
+    return tuple(replace(building, protected=building.group in groups) for building in buildings)
 
 
 def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> int:
     """Return the index of the building of a name, the scenario's or the map's."""
     asked = shortened(name, MOST_TITLE).casefold()
     for key in ("name", "title"):
-        for index, each in enumerate(buildings):
-            if getattr(each, key).casefold() == asked:
+        for index, building in enumerate(buildings):
+            if getattr(building, key).casefold() == asked:
                 return index
     for lost in site.ledger.of(Fate.LEFT_OUT):
         if lost.name.casefold() == name.casefold():
@@ -396,18 +396,18 @@ def _nearest(
     """Return the index of the building nearest to a place of the map."""
     x_m, y_m = site.to_site(np.array([place]))[0]
     point = shapely.Point(x_m, y_m)
-    distances_m = [each.outline.distance(point) for each in buildings]
-    best, known = int(np.argmin(distances_m)), {each.place for each in buildings}
-    reasons = {each.place: each.kind for each in site.ledger.of(Fate.LEFT_OUT)}
+    distances_m = [thing.outline.distance(point) for thing in buildings]
+    best, known = int(np.argmin(distances_m)), {thing.place for thing in buildings}
+    reasons = {thing.place: thing.kind for thing in site.ledger.of(Fate.LEFT_OUT)}
     reasons = {key: reason for key, reason in reasons.items() if key not in known}
-    for each in (*site.of_role(Role.BUILDING), *site.faulty):
-        if each.place not in reasons or each.role is not Role.BUILDING or each.geometry.is_empty:
+    for thing in (*site.of_role(Role.BUILDING), *site.faulty):
+        if thing.place not in reasons or thing.role is not Role.BUILDING or thing.geometry.is_empty:
             continue
-        if each.geometry.convex_hull.distance(point) < distances_m[best]:
-            words = f" ({named(each.name)})" if each.name else ""
+        if thing.geometry.convex_hull.distance(point) < distances_m[best]:
+            words = f" ({named(thing.name)})" if thing.name else ""
             raise BlastEnvError(
                 f"--protect-near is {place[0]:.10g},{place[1]:.10g}: the building nearest to it "
-                f"is {each.place}{words}, which is left out: {reasons[each.place]}"
+                f"is {thing.place}{words}, which is left out: {reasons[thing.place]}"
             )
     if not shapely.intersects(point, site.box):
         raise BlastEnvError(
@@ -419,12 +419,12 @@ def _nearest(
 
 def _listed(buildings: Sequence[FittedBuilding]) -> str:
     """Return the names of some buildings, those with names on the map first."""
-    titled = sorted(buildings, key=lambda each: not each.title)
+    titled = sorted(buildings, key=lambda building: not building.title)
     shown = [
-        each.name
-        if "_".join(each.title.split()) in ("", each.name)
-        else f"{each.name} ({named(each.title)})"
-        for each in titled[:_MOST_LISTED]
+        name.name
+        if "_".join(name.title.split()) in ("", name.name)
+        else f"{name.name} ({named(name.title)})"
+        for name in titled[:_MOST_LISTED]
     ]
     more = len(buildings) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more else "")

@@ -76,9 +76,9 @@ def charge_sources(
     asked, mouths = list(_asked(site, free)), mouths_of(site, buildings, free)
     things, most = _on_site(site, Role.CHARGE), MOST_SOURCES - len(asked)
     sources, has_kerbs = _fewest(site, things, free, mouths, most), True
-    if len(sources) > most and any(each.width_m for each in things):
+    if len(sources) > most and any(thing.width_m for thing in things):
         has_kerbs = False
-        things = [replace(each, width_m=None) for each in things]
+        things = [replace(thing, width_m=None) for thing in things]
         sources = _fewest(site, things, free, mouths, most)
     if len(sources) > most:
         raise BlastEnvError(
@@ -92,14 +92,14 @@ def charge_sources(
             "--charge-at X,Y, with --charges-from where one may be, or --margin for more ground"
         )
     used = frozenset(place for place, _ in sources)
-    for each in site.of_role(Role.CHARGE):
-        if each.place not in used:
-            on_site = shapely.intersects(each.geometry, site.box)
+    for thing in site.of_role(Role.CHARGE):
+        if thing.place not in used:
+            on_site = shapely.intersects(thing.geometry, site.box)
             fate, kind = (Fate.LEFT_OUT, _BUILT_OVER) if on_site else site.beyond
-            site.ledger.add(fate, kind, each.place, each.name)
-        elif each.width_m is not None and not has_kerbs:
+            site.ledger.add(fate, kind, thing.place, thing.name)
+        elif thing.width_m is not None and not has_kerbs:
             kind = "streets of too many bends, with charges on the centre line instead of the kerbs"
-            site.ledger.add(Fate.GUESSED, kind, each.place, each.name)
+            site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name)
     return [*asked, *(source for _, source in sources)], used
 
 
@@ -109,7 +109,7 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
     gap_m = radius_m + _CLEAR_M
     inside = shapely.box(gap_m, gap_m, width_m - gap_m, height_m - gap_m)
     built = shapely.union_all(
-        [shapely.box(*each.grown(gap_m)) for building in buildings for each in building.boxes_m]
+        [shapely.box(*box_m.grown(gap_m)) for building in buildings for box_m in building.boxes_m]
     )
     return shapely.difference(inside, built)
 
@@ -120,10 +120,10 @@ def _fewest(
     """Return the sources of things with their places, in the finest form of at most `most`."""
     for tolerance_m in _SIMPLER_M:
         sources = [
-            (each.place, source | {"tnt_kg": each.tnt_kg or site.options.tnt_kg})
-            for each in things
+            (thing.place, source | {"tnt_kg": thing.tnt_kg or site.options.tnt_kg})
+            for thing in things
             for source in _with_mouths(
-                list(_sources(site, each, free, tolerance_m)), mouths.get(each.place, ())
+                list(_sources(site, thing, free, tolerance_m)), mouths.get(thing.place, ())
             )
         ]
         if len(sources) <= most:
@@ -136,7 +136,7 @@ def _with_mouths(
 ) -> Iterator[dict[str, Any]]:
     """Yield the places of a charge of a street, and its mouths to which it does not lead."""
     yield from sources
-    ends = [end for each in sources if each["kind"] == "segment" for end in _ends_of(each)]
+    ends = [end for source in sources if source["kind"] == "segment" for end in _ends_of(source)]
     for place in mouths:
         if all(dist(place, end) > _AT_MOUTH_M for end in ends):
             yield _point(*place)
@@ -218,13 +218,13 @@ def build_zone(site: PlacedSite, buildings: Sequence[FittedBuilding]) -> dict[st
         area_m = Rectangle(left, bottom, left + width, bottom + height)
         inside[_window(site, area_m, "--zone")] = True
     elif options.zone_around_m is not None:
-        chosen = [each for own in buildings if own.protected for each in own.boxes_m]
+        chosen = [box_m for own in buildings if own.protected for box_m in own.boxes_m]
         around = Rectangle.around(chosen).grown(options.zone_around_m)
         cut = Rectangle(*shapely.intersection(shapely.box(*around), site.box).bounds)
         inside[_window(site, cut, "--zone-around")] = True
     elif site.of_role(Role.ZONE):
-        for each in _on_site(site, Role.ZONE):
-            inside |= cells_of(each.geometry, site.shape)
+        for item in _on_site(site, Role.ZONE):
+            inside |= cells_of(item.geometry, site.shape)
     elif options.zone_from:
         raise BlastEnvError(
             f"{site.path}: nothing on the site is chosen by --zone-from {options.zone_from}"
@@ -254,11 +254,11 @@ def _keep_outs(
     reach_m = 0.5 * MODULE_SIDE_M - _TOUCHED_M
     areas = [
         (
-            (each.name or "no-build area of the map")[:_MOST_REASON],
-            each.geometry.buffer(reach_m, join_style="mitre"),
+            (item.name or "no-build area of the map")[:_MOST_REASON],
+            item.geometry.buffer(reach_m, join_style="mitre"),
         )
-        for each in _on_site(site, Role.KEEP_OUT)
-        if each.geometry.area
+        for item in _on_site(site, Role.KEEP_OUT)
+        if item.geometry.area
     ]
     first = window[0].start, window[1].start
     for side in _COARSER:
@@ -315,7 +315,7 @@ def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, sl
             f"{option} is x {left:g} to {right:g} m, y {bottom:g} to {top:g} m, must lie on the "
             f"site (x 0 to {width_m:g} m, y 0 to {height_m:g} m)"
         )
-    left, bottom, right, top = (round(each / MODULE_SIDE_M) for each in area_m)
+    left, bottom, right, top = (round(rectangle / MODULE_SIDE_M) for rectangle in area_m)
     return slice(bottom, max(top, bottom + 1)), slice(left, max(right, left + 1))
 
 
@@ -325,7 +325,7 @@ def cells_of(outline: BaseGeometry, shape: tuple[int, int]) -> BoolArray:
     if not outline.area:
         return cells
     bounds = np.array(outline.bounds) / MODULE_SIDE_M
-    left, bottom, right, top = (max(int(each), 0) for each in (*bounds[:2], *np.ceil(bounds[2:])))
+    left, bottom, right, top = (max(int(item), 0) for item in (*bounds[:2], *np.ceil(bounds[2:])))
     window = cells[bottom:top, left:right]
     rows, columns = window.shape
     x_m = MODULE_SIDE_M * (left + np.arange(columns) + 0.5)

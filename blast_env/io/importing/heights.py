@@ -121,7 +121,7 @@ class _Reading:
     def storeys_m(self, keys: tuple[str, ...], more: tuple[str, ...] = ()) -> float | None:
         """Return the height of the first readable number of storeys, and of more of them, m."""
         counts = [self._storeys(keys), self._storeys(more)]
-        known = [each for each in counts if each is not None]
+        known = [count for count in counts if count is not None]
         total = sum(known) * self.reader.site_map.options.level_height_m
         if total > MOST_HEIGHT_M:
             self._unread(next(key for key in (*keys, *more) if key in self.tags), total)
@@ -150,8 +150,8 @@ class _Reading:
         value = self.tags[key]
         number = length_m(value, unit_m)
         if number is None and isinstance(value, str) and _SEVERAL.fullmatch(value.strip()):
-            numbers = [length_m(each, unit_m) for each in re.split(r"[;/-]", value[:MAX_TEXT])]
-            number = max((each for each in numbers if each), default=None)
+            numbers = [length_m(part, unit_m) for part in re.split(r"[;/-]", value[:MAX_TEXT])]
+            number = max((item for item in numbers if item), default=None)
             detail = f"{key} is {value_text(value)}, the largest counts"
             self._guessed("heights of several numbers", detail)
         return number

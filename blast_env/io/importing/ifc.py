@@ -61,7 +61,7 @@ def read_ifc(site_map: SiteMap) -> None:
     options.refuse("IFC, which is in metres of its own", "crs")
     with errors_of("ifcopenshell", path, "IFC"):
         model = ifcopenshell.open(str(path))
-        if not any(each.UnitType == "LENGTHUNIT" for each in _units(model)):
+        if not any(unit.UnitType == "LENGTHUNIT" for unit in _units(model)):
             raise BlastEnvError(f"{path}: states no unit of length, must state one")
         if not model.by_type("IfcBuilding"):
             raise BlastEnvError(f"{path}: has no IfcBuilding")
@@ -72,9 +72,9 @@ def read_ifc(site_map: SiteMap) -> None:
 
 def _units(model: Any) -> list[Any]:
     """Return the named units of a project."""
-    assigned = [each.UnitsInContext for each in model.by_type("IfcProject")]
-    units = [unit for each in assigned if each is not None for unit in each.Units or ()]
-    return [each for each in units if each.is_a("IfcNamedUnit")]
+    assigned = [project.UnitsInContext for project in model.by_type("IfcProject")]
+    units = [unit for item in assigned if item is not None for unit in item.Units or ()]
+    return [item for item in units if item.is_a("IfcNamedUnit")]
 
 
 def _note_place(model: Any, ledger: Ledger, name: str) -> None:
@@ -86,8 +86,8 @@ def _note_place(model: Any, ledger: Ledger, name: str) -> None:
             detail = f"{angle_deg:.1f} degrees clockwise from its y axis"
             ledger.add(Fate.NOTED, _NORTH, name, detail=detail)
     kinds = () if model.schema == "IFC2X3" else ("IfcCoordinateOperation",)
-    if any(model.by_type(each) for each in kinds) or any(
-        each.RefLatitude or each.RefLongitude for each in model.by_type("IfcSite")
+    if any(model.by_type(kind) for kind in kinds) or any(
+        place.RefLatitude or place.RefLongitude for place in model.by_type("IfcSite")
     ):
         ledger.add(Fate.NOTED, _ON_EARTH, name)
 
@@ -104,37 +104,45 @@ class _Model:
         self._map, self._model = site_map, model
         self._scale = calculate_unit_scale(model)
         self._buildings = model.by_type("IfcBuilding")
-        self._products = [each for each in model.by_type("IfcProduct") if _is_object(each)]
+        self._products = [product for product in model.by_type("IfcProduct") if _is_object(product)]
         check_count(site_map.path, len(self._products), MOST_FEATURES, "outlines and lines")
-        ids = Counter(each.GlobalId for each in model.by_type("IfcProduct"))
-        self._twice = {each for each, count in ids.items() if count > 1}
+        ids = Counter(product.GlobalId for product in model.by_type("IfcProduct"))
+        self._twice = {guid for guid, count in ids.items() if count > 1}
 
     def read(self) -> None:
         """Add the buildings, the walls of the site, and all else with the reason."""
-        windows = [each for each in self._model.by_type("IfcWindow") if not each.Representation]
-        panes = {part.id(): part for each in windows for part in _parts_of(each)}
-        chosen = {each.id(): each for each in self._products if _is_any(each, (*_SHAPED, *_POSTS))}
-        solids = {each.element.id(): each for each in self._solids([*(chosen | panes).values()])}
-        owners = {each.id(): self._owner(each) for each in self._products}
+        windows = [
+            product for product in self._model.by_type("IfcWindow") if not product.Representation
+        ]
+        panes = {part.id(): part for product in windows for part in _parts_of(product)}
+        chosen = {
+            product.id(): product
+            for product in self._products
+            if _is_any(product, (*_SHAPED, *_POSTS))
+        }
+        solids = {
+            product.element.id(): product for product in self._solids([*(chosen | panes).values()])
+        }
+        owners = {product.id(): self._owner(product) for product in self._products}
         if not any(owners[key] for key in solids) and len(self._buildings) == 1:
             owners = dict.fromkeys(owners, self._buildings[0])  # all hangs at the site
         used = set(self._join(windows, solids))
         reasons, grounds_m = dict[int, str](), list[float]()
         for entity in self._buildings:
-            own = [each for key, each in solids.items() if owners[key] == entity]
+            own = [product for key, product in solids.items() if owners[key] == entity]
             building = self._building(entity, own)
             grounds_m.append(building.ground_m)
             used |= self._add(building)
-            reasons |= {each.element.id(): building.reason(each) for each in own}
-        lonely = [each for key, each in solids.items() if owners[key] is None]
+            reasons |= {product.element.id(): building.reason(product) for product in own}
+        lonely = [product for key, product in solids.items() if owners[key] is None]
         used |= self._add_of_site(lonely, min(grounds_m, default=0.0))
-        for each in self._products:
-            if each.id() not in used:
-                self._leave(each, solids.get(each.id()), reasons.get(each.id(), ""))
+        for product in self._products:
+            if product.id() not in used:
+                self._leave(product, solids.get(product.id()), reasons.get(product.id(), ""))
 
     def _solids(self, elements: list[Any]) -> Iterator[Solid]:
         """Yield the elements that have a shape."""
-        elements = [each for each in elements if each.Representation]
+        elements = [item for item in elements if item.Representation]
         if not elements:
             return
         settings = ifcopenshell.geom.settings()
@@ -154,16 +162,16 @@ class _Model:
     def _join(self, windows: list[Any], solids: dict[int, Solid]) -> Iterator[int]:
         """Give windows without a shape those of their frames and panes; yield the ids of these."""
         for window in windows:
-            parts = [each.id() for each in _parts_of(window) if each.id() in solids]
+            parts = [part.id() for part in _parts_of(window) if part.id() in solids]
             if not parts:
                 continue
             place = self._place(window)
-            own = [solids.pop(each) for each in parts]
-            faces = Faces.joined(each.faces for each in own)
+            own = [solids.pop(part) for part in parts]
+            faces = Faces.joined(part.faces for part in own)
             solids[window.id()] = Solid(window, place, is_post=False, faces=faces)
-            for each in own:
+            for part in own:
                 self._map.ledger.add(
-                    Fate.MERGED, "parts of windows", each.place, detail=f"of {place}"
+                    Fate.MERGED, "parts of windows", part.place, detail=f"of {place}"
                 )
             yield from parts
 
@@ -182,12 +190,12 @@ class _Model:
     def _building(self, entity: Any, solids: list[Solid]) -> Building:
         base_m = self._placed_m(entity)
         storeys = [
-            each
-            for each in self._model.by_type("IfcBuildingStorey")
-            if self._owner_of_storey(each) == entity
+            storey
+            for storey in self._model.by_type("IfcBuildingStorey")
+            if self._owner_of_storey(storey) == entity
         ]
-        storeys_m = [self._placed_m(each) for each in storeys]
-        stated_m = [base_m + self._scale * float(each.Elevation or 0.0) for each in storeys]
+        storeys_m = [self._placed_m(storey) for storey in storeys]
+        stated_m = [base_m + self._scale * float(storey.Elevation or 0.0) for storey in storeys]
         if len({*stated_m}) > len({*storeys_m}):  # all storeys are placed at one height
             storeys_m = stated_m
         stated = [
@@ -204,7 +212,7 @@ class _Model:
             place=self._place(entity),
             name=str(entity.Name or entity.LongName or ""),
             solids=tuple(solids),
-            storeys_m={each.id(): at_m for each, at_m in zip(storeys, storeys_m, strict=True)},
+            storeys_m={storey.id(): at_m for storey, at_m in zip(storeys, storeys_m, strict=True)},
             placed_m=base_m,
             stated_m=tuple(heights_m),
             options=self._map.options,

@@ -208,9 +208,9 @@ class Building:
         if lost_m2 > _LEAST_M2:
             ledger.add(Fate.CUT, _NARROW, self.place, self.name, f"{lost_m2:.1f} m2")
         for number, windows in self._windows.items():
-            sizes = {_size_m(each) for each in windows}
+            sizes = {_size_m(window) for window in windows}
             width_m, height_m = _largest(windows)
-            glass_m2 = sum(np.prod(_size_m(each)) for each in windows)
+            glass_m2 = sum(np.prod(_size_m(window)) for window in windows)
             detail = (
                 f"{len(windows)} with {glass_m2:.1f} m2 of glass, to {self._bodies[number].top_m:g}"
                 f" m, {len(sizes)} sizes, the largest {width_m:g} x {height_m:g} m"
@@ -226,7 +226,7 @@ class Building:
     @cached_property
     def _walls(self) -> tuple[Solid, ...]:
         """What it is made of: no windows, no posts."""
-        return tuple(each for each in self.solids if not each.is_post and not is_window(each))
+        return tuple(solid for solid in self.solids if not solid.is_post and not is_window(solid))
 
     @cached_property
     def _ground(self) -> tuple[str, float]:
@@ -237,8 +237,8 @@ class Building:
         walls = self._walls
         if not walls:
             return "where it is placed", self.placed_m
-        low_m = min(each.low_m for each in self.solids)
-        top_m = max(each.high_m for each in walls)
+        low_m = min(solid.low_m for solid in self.solids)
+        top_m = max(wall.high_m for wall in walls)
         candidates = [("where it is placed", self.placed_m), *self.stated_m]
         if self.storeys_m:
             candidates.append(("its lowest storey", min(self.storeys_m.values())))
@@ -252,26 +252,26 @@ class Building:
     def _bodies(self) -> list[BodyPart]:
         """Its parts, in the heights of the model."""
         walls = self._walls
-        if not walls or max(each.high_m for each in walls) <= self.ground_m + LEAST_STOREY_M:
+        if not walls or max(wall.high_m for wall in walls) <= self.ground_m + LEAST_STOREY_M:
             return []
         limit_m = self.ground_m + LEAST_STOREY_M
-        feet = [each for each in self.solids if each.low_m <= limit_m < each.high_m]
-        plans = [plan for each in feet for plan in each.feet]
-        faces = Faces.joined(each.faces for each in walls)
+        feet = [solid for solid in self.solids if solid.low_m <= limit_m < solid.high_m]
+        plans = [plan for solid in feet for plan in solid.feet]
+        faces = Faces.joined(wall.faces for wall in walls)
         parts = faces.parts(self.ground_m, plans, self.options.least_area_m2)
         if parts or self._shadow.is_empty:
             return parts
-        return [BodyPart(self._shadow, self.ground_m, max(each.high_m for each in walls))]
+        return [BodyPart(self._shadow, self.ground_m, max(wall.high_m for wall in walls))]
 
     @cached_property
     def _outline(self) -> BaseGeometry:
-        return shapely.union_all([each.outline for each in self._bodies])
+        return shapely.union_all([body.outline for body in self._bodies])
 
     @cached_property
     def _shadow(self) -> BaseGeometry:
         """The area below what is higher than a storey."""
         limit_m = self.ground_m + LEAST_STOREY_M
-        return shapely.union_all([each.shadow for each in self._walls if each.high_m > limit_m])
+        return shapely.union_all([wall.shadow for wall in self._walls if wall.high_m > limit_m])
 
     @cached_property
     def _windows(self) -> dict[int, list[Solid]]:
@@ -282,8 +282,8 @@ class Building:
             height_m = solid.middle_m
             around = [
                 number
-                for number, each in enumerate(self._bodies)
-                if each.base_m <= height_m <= each.top_m
+                for number, body in enumerate(self._bodies)
+                if body.base_m <= height_m <= body.top_m
             ]
             if not around or _is_in_roof(solid):
                 continue
@@ -302,15 +302,15 @@ class Building:
     def _inside(self, height_m: float, around: Sequence[int]) -> BaseGeometry:
         """Return the area that walls enclose at a height, as far as it is built over."""
         section = shapely.union_all([self._bodies[number].outline for number in around])
-        walls = [each.shadow for each in self._walls if each.low_m < height_m < each.high_m]
+        walls = [wall.shadow for wall in self._walls if wall.low_m < height_m < wall.high_m]
         inside = common(enclosed(walls), section) if walls else section
         return inside if inside.area else section
 
     @cached_property
     def _floors_m(self) -> list[float]:
         """Heights of the storeys on which windows stand, or that have a slab."""
-        tops_m = [each.high_m for each in self._walls if each.element.is_a("IfcSlab")]
-        used = {self._floor_m(each) for own in self._windows.values() for each in own}
+        tops_m = [wall.high_m for wall in self._walls if wall.element.is_a("IfcSlab")]
+        used = {self._floor_m(wall) for own in self._windows.values() for wall in own}
         slabs = {
             floor_m
             for floor_m in self.storeys_m.values()
@@ -324,7 +324,9 @@ class Building:
             floor_m = self.storeys_m.get(holds.RelatingStructure.id())
             if floor_m is not None and floor_m <= window.low_m + _BASE_M:
                 return floor_m
-        below = [each for each in self.storeys_m.values() if each <= window.low_m + _BASE_M]
+        below = [
+            storey_m for storey_m in self.storeys_m.values() if storey_m <= window.low_m + _BASE_M
+        ]
         return max(below, default=None)
 
     def _facade(self, part: BodyPart, windows: Sequence[Solid]) -> dict[str, float]:
@@ -336,10 +338,10 @@ class Building:
             if floor_m - floors_m[-1] >= _STOREY_M and floor_m <= part.top_m - LEAST_STOREY_M:
                 floors_m.append(floor_m)
         width_m, height_m = _largest(windows)
-        large = [each for each in windows if _size_m(each) == (width_m, height_m)]
+        large = [window for window in windows if _size_m(window) == (width_m, height_m)]
         sills_m = [
-            each.low_m - max((at for at in floors_m if at <= each.low_m), default=each.low_m)
-            for each in large
+            solid.low_m - max((at for at in floors_m if at <= solid.low_m), default=solid.low_m)
+            for solid in large
         ]
         apart_m = max(part.outline.length * len(floors_m) / len(windows), 1.1 * width_m)
         return {
@@ -360,20 +362,22 @@ def _is_curtain(solid: Solid) -> bool:
     """Return whether a solid is a curtain wall, or a plate of one."""
     if solid.element.is_a("IfcCurtainWall"):
         return True
-    above = [each.RelatingObject for each in getattr(solid.element, "Decomposes", None) or ()]
+    above = [
+        relation.RelatingObject for relation in getattr(solid.element, "Decomposes", None) or ()
+    ]
     return bool(solid.element.is_a("IfcPlate")) and (
         getattr(solid.element, "PredefinedType", None) == "CURTAIN_PANEL"
-        or any(each.is_a("IfcCurtainWall") for each in above)
+        or any(storey_m.is_a("IfcCurtainWall") for storey_m in above)
     )
 
 
 def _size_m(window: Solid) -> tuple[float, float]:
     """Return width and height of a window as of one pane, in whole centimetres."""
     sides_m = (window.sides_m[0], window.high_m - window.low_m)
-    width_m, height_m = (round(float(np.clip(each, *_PANES_M)), _DIGITS) for each in sides_m)
+    width_m, height_m = (round(float(np.clip(side_m, *_PANES_M)), _DIGITS) for side_m in sides_m)
     return width_m, height_m
 
 
 def _largest(windows: Sequence[Solid]) -> tuple[float, float]:
     """Return the size of the pane with the largest area, which breaks first."""
-    return max((_size_m(each) for each in windows), key=lambda size_m: size_m[0] * size_m[1])
+    return max((_size_m(window) for window in windows), key=lambda size_m: size_m[0] * size_m[1])

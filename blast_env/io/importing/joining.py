@@ -69,8 +69,8 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     """Return the outlines that lines close together, and the other lines with a fault."""
     parts = [
         (index, shapely.get_coordinates(part))
-        for index, each in enumerate(lines)
-        for part in shapely.get_parts(each.geometry)
+        for index, line in enumerate(lines)
+        for part in shapely.get_parts(line.geometry)
     ]
     owners = np.array([index for index, _ in parts])
     sides, gaps_m = _snapped([places for _, places in parts])
@@ -90,7 +90,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             used.setdefault(k, len(found) - 1)
     bridged_m = np.zeros(len(lines))
     np.maximum.at(bridged_m, owners, gaps_m)
-    chiefs = {each.place for each in found}
+    chiefs = {group.place for group in found}
     for k, outline in used.items():
         words = f", {1000.0 * bridged_m[k]:.1f} mm bridged" if bridged_m[k] > _ROUNDING_M else ""
         own = lines[k]
@@ -98,7 +98,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         if own.place not in chiefs:
             detail = f"with {found[outline].place}"
             ledger.add(Fate.MERGED, "sides of outlines", own.place, own.name, detail)
-    left = [replace(each, fault=OPEN) for k, each in enumerate(lines) if k not in used]
+    left = [replace(line, fault=OPEN) for k, line in enumerate(lines) if k not in used]
     return [*found, *left]
 
 
@@ -127,13 +127,13 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     """
     outlines = [
         k
-        for k, each in enumerate(things)
-        if each.role is Role.BUILDING
-        and not each.fault
-        and each.geometry.geom_type == "Polygon"
-        and each.geometry.is_valid
+        for k, thing in enumerate(things)
+        if thing.role is Role.BUILDING
+        and not thing.fault
+        and thing.geometry.geom_type == "Polygon"
+        and thing.geometry.is_valid
     ]
-    texts = shapely.STRtree([each.geometry for each in things if each.role is Role.NAME])
+    texts = shapely.STRtree([thing.geometry for thing in things if thing.role is Role.NAME])
     shapes = np.array([things[k].geometry for k in outlines], dtype=object)
     areas = shapely.area(shapes)
     whole = np.asarray(shapely.area(shapely.polygons(shapely.get_exterior_ring(shapes))))
@@ -155,17 +155,17 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             kind, detail = "fillings of outlines", f"of {found[outline].place}"
             ledger.add(Fate.MERGED, kind, filling.place, filling.name, detail)
             gone.add(outlines[low])
-    for low, around in sorted(deep.items(), key=lambda each: len(each[1])):
+    for low, around in sorted(deep.items(), key=lambda item: len(item[1])):
         court = things[outlines[low]]
         if outlines[low] in gone:
             continue
         if len(around) % 2 == 0 or court.name or len(texts.query(court.geometry, "contains")):
             continue
-        high = outlines[min(around, key=lambda each: areas[each])]
+        high = outlines[min(around, key=lambda item: areas[item])]
         hole = shapely.difference(found[high].geometry, court.geometry)
         found[high] = replace(found[high], geometry=hole)
         kind, detail = "outlines within outlines, taken as courtyards", found[high].place
         ledger.add(Fate.GUESSED, kind, court.place, court.name, f"of {detail}")
         ledger.add(Fate.MERGED, "courtyards", court.place, court.name, f"with {detail}")
         gone.add(outlines[low])
-    return [each for k, each in enumerate(found) if k not in gone]
+    return [group for k, group in enumerate(found) if k not in gone]

@@ -90,7 +90,7 @@ class Ledger:
 
     def of(self, *fates: Fate) -> tuple[LedgerEntry, ...]:
         """Return the entries of some fates."""
-        return tuple(each for each in self.entries if each.fate in fates)
+        return tuple(entry for entry in self.entries if entry.fate in fates)
 
     @property
     def objects(self) -> int:
@@ -136,9 +136,9 @@ class Ledger:
                 {
                     key: value
                     for key in ("place", "name", "detail", "position")
-                    if (value := getattr(each, key))
+                    if (value := getattr(entry, key))
                 }
-                for each in entries
+                for entry in entries
             ]
         return record
 
@@ -161,13 +161,13 @@ class Ledger:
     def _grouped(self, fates: Sequence[Fate]) -> dict[tuple[Fate, str], list[LedgerEntry]]:
         groups: dict[tuple[Fate, str], list[LedgerEntry]] = {}
         for fate in fates:
-            for each in self.of(fate):
-                groups.setdefault((fate, each.kind), []).append(each)
+            for entry in self.of(fate):
+                groups.setdefault((fate, entry.kind), []).append(entry)
         return groups
 
 
 def _line(kind: tuple[Fate, str], entries: Sequence[LedgerEntry], count: int) -> str:
     """Return a line on the entries of a kind with the first of its objects."""
-    shown = [each.words for each in entries[:count]]
+    shown = [entry.words for entry in entries[:count]]
     more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []
     return f"{kind[0]}: {kind[1]}: {len(entries)} ({', '.join([*shown, *more])})"

@@ -151,7 +151,9 @@ class _Extract:
                 ways[item.id] = tags, [self._node(node) for node in item.nodes]
                 points += len(item.nodes) if tags else 0
             elif tags:
-                members = [(each.ref, each.role) for each in item.members if each.type == "w"]
+                members = [
+                    (member.ref, member.role) for member in item.members if member.type == "w"
+                ]
                 relations[item.id] = tags, members
             check_count(self.site_map.path, points, MOST_POINTS, "points")
         self._nodes(plain, {node for _, nodes in ways.values() for node in nodes})

@@ -37,7 +37,7 @@ def fitted(
     if not facade:
         return {}
     found = dict(facade)
-    wide_m = [each for each in walls_m if each >= found["width"]]
+    wide_m = [wall_m for wall_m in walls_m if wall_m >= found["width"]]
     if not wide_m:
         ledger.add(Fate.GUESSED, _WIDE, place, detail=f"{found['width']:g} m")
         return {}
@@ -61,4 +61,4 @@ def fitted(
 
 def _all_fit(bay_m: float, width_m: float, walls_m: Sequence[float]) -> bool:
     """Return whether a window fits into the bays of all walls."""
-    return all(each / max(1, round(each / bay_m)) >= width_m for each in walls_m)
+    return all(wall_m / max(1, round(wall_m / bay_m)) >= width_m for wall_m in walls_m)

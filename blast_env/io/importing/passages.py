@@ -37,7 +37,7 @@ def mouths_of(site: PlacedSite, buildings: Sequence[FittedBuilding], free: BaseG
         buildings: Its buildings.
         free: The area of possible centres of a charge.
     """
-    outlines = np.array([each.outline for each in buildings], dtype=object)
+    outlines = np.array([building.outline for building in buildings], dtype=object)
     tree = shapely.STRtree(outlines)
     found: Mouths = {}
     for street in site.of_role(Role.CHARGE):
@@ -50,11 +50,11 @@ def mouths_of(site: PlacedSite, buildings: Sequence[FittedBuilding], free: BaseG
         ]
         if not crossed:
             continue
-        is_solid = any(not each.base_m for each in crossed)
-        detail = f"through {', '.join(each.name for each in crossed)}"
+        is_solid = any(not building.base_m for building in crossed)
+        detail = f"through {', '.join(building.name for building in crossed)}"
         kind = _SOLID if is_solid else _RAISED
         site.ledger.add(Fate.GUESSED, kind, street.place, street.name, detail)
-        built = shapely.union_all([each.outline for each in crossed])
+        built = shapely.union_all([building.outline for building in crossed])
         ends = _ends(_inside(street, built), built)
         ahead = (_ahead(end, way, free) for end, way in ends)
         found[street.place] = [place for place in ahead if place is not None]

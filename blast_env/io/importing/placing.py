@@ -93,7 +93,7 @@ class PlacedSite:
 
     def of_role(self, role: Role) -> tuple[Thing, ...]:
         """Return the things of a role."""
-        return tuple(each for each in self.things if each.role is role)
+        return tuple(thing for thing in self.things if thing.role is role)
 
     def hint_of_exchange(self, place: tuple[float, float]) -> str:
         """Return a hint for a place outside the site that is inside with x and y exchanged."""
@@ -117,22 +117,26 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
             be too large.
     """
     options, ledger = site_map.options, site_map.ledger
-    faulty = [each for each in things if each.fault]
-    things = [each for each in things if not each.fault]
+    faulty = [thing for thing in things if thing.fault]
+    things = [thing for thing in things if not thing.fault]
     if not things:
         raise _nothing(site_map, faulty)
     plane = plane_around(site_map.crs, site_map.unit_m, _reference(things, options))
     near = closed(_near(site_map, things, plane), ledger)
     if site_map.has_layers:
         near = with_courtyards(near, ledger)
-    open_lines = [each for each in near if each.fault]
-    near = [each for each in near if not each.fault]
-    if not near or (options.size_m is None and Role.BUILDING not in {each.role for each in near}):
+    open_lines = [street for street in near if street.fault]
+    near = [street for street in near if not street.fault]
+    if not near or (
+        options.size_m is None and Role.BUILDING not in {street.role for street in near}
+    ):
         raise _nothing(site_map, [*faulty, *open_lines])
     rotation_deg = _rotation_deg(near, options)
     turned = _moved(near, lambda places: rotated(places, -rotation_deg))
     corner_m, shape = _grid(site_map, turned, plane, rotation_deg)
-    layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
+    layers = sorted(
+        {str(feature.tags["layer"]) for feature in site_map.features if "layer" in feature.tags}
+    )
     site = PlacedSite(
         path=site_map.path,
         options=options,
@@ -151,18 +155,18 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
 def _faults(faulty: Iterable[Thing], site: PlacedSite) -> Iterator[Thing]:
     """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger."""
     is_whole_file = site.options.size_m is None
-    for each in faulty:
-        if is_whole_file or each.geometry.is_empty or shapely.intersects(each.geometry, site.box):
-            site.ledger.add(Fate.LEFT_OUT, each.fault, each.place, each.name)
-            yield each
+    for thing in faulty:
+        if is_whole_file or thing.geometry.is_empty or shapely.intersects(thing.geometry, site.box):
+            site.ledger.add(Fate.LEFT_OUT, thing.fault, thing.place, thing.name)
+            yield thing
         else:
-            site.ledger.add(Fate.PASSED, OUTSIDE, each.place, each.name)
+            site.ledger.add(Fate.PASSED, OUTSIDE, thing.place, thing.name)
 
 
 def _nothing(site_map: SiteMap, faulty: Sequence[Thing]) -> BlastEnvError:
     """Return the error of a map without a building."""
     chosen = site_map.options.buildings_from
-    faults = Counter(each.fault for each in faulty if each.role is Role.BUILDING)
+    faults = Counter(thing.fault for thing in faulty if thing.role is Role.BUILDING)
     reasons = "; ".join(f"{count} {fault}" for fault, count in faults.most_common(_MOST_LISTED))
     if reasons:
         return BlastEnvError(f"{site_map.path}: has no building that can be used, but {reasons}")
@@ -178,19 +182,19 @@ def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, 
     if asked is not None:
         return asked
     shown = _chief(things)
-    left, bottom, right, top = shapely.total_bounds([each.geometry for each in shown])
+    left, bottom, right, top = shapely.total_bounds([thing.geometry for thing in shown])
     return float(left + right) / 2.0, float(bottom + top) / 2.0
 
 
 def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
     """Return the objects that fix the site: its outline, or all objects but streets and texts."""
-    own = [each for each in things if each.role is Role.SITE]
+    own = [thing for thing in things if thing.role is Role.SITE]
     if own:
         return own
     fixed = [
-        each
-        for each in things
-        if each.role is not Role.NAME and not (each.role is Role.CHARGE and each.is_line)
+        thing
+        for thing in things
+        if thing.role is not Role.NAME and not (thing.role is Role.CHARGE and thing.is_line)
     ]
     return fixed or things
 
@@ -199,7 +203,7 @@ def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thin
     """Return the objects that may lie on the site, in metres of the plane."""
     options = site_map.options
     measured = _moved(things, plane.to_metres)
-    geometries = [each.geometry for each in measured]
+    geometries = [street.geometry for street in measured]
     reference = options.origin or options.centre
     if options.size_m is None or reference is None:
         if not np.isfinite(shapely.bounds(geometries)).all():
@@ -217,7 +221,7 @@ def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thin
         site_map.ledger.add(Fate.PASSED, OUTSIDE, far.place, far.name)
     if not is_near.any():
         x, y = reference
-        left, bottom, right, top = shapely.total_bounds([each.geometry for each in things])
+        left, bottom, right, top = shapely.total_bounds([thing.geometry for thing in things])
         flag = "--origin" if options.centre is None else "--centre"
         hint = _EXCHANGED if left <= y <= right and bottom <= x <= top else ""
         raise BlastEnvError(
@@ -229,16 +233,16 @@ def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thin
 
 def _moved(things: Sequence[Thing], move: Callable[[FloatArray], FloatArray]) -> list[Thing]:
     """Return things with all coordinates transformed in one call."""
-    geometries = shapely.transform([each.geometry for each in things], move)
-    return [replace(each, geometry=new) for each, new in zip(things, geometries, strict=True)]
+    geometries = shapely.transform([thing.geometry for thing in things], move)
+    return [replace(thing, geometry=new) for thing, new in zip(things, geometries, strict=True)]
 
 
 def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
     """Return the direction of the site: that of the options, or that of most walls."""
     if options.rotation_deg is not None:
         return options.rotation_deg
-    own = [each.geometry for each in things if each.role is Role.SITE]
-    walls = own or [each.geometry for each in things if each.role is Role.BUILDING]
+    own = [thing.geometry for thing in things if thing.role is Role.SITE]
+    walls = own or [thing.geometry for thing in things if thing.role is Role.BUILDING]
     return dominant_direction_deg(walls)
 
 
@@ -259,8 +263,8 @@ def _grid(
             f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
         )
     box = shapely.box(left, bottom, right, top)
-    own = [each.geometry for each in things if each.role is Role.SITE]
-    buildings = np.array([each.geometry for each in things if each.role is Role.BUILDING])
+    own = [thing.geometry for thing in things if thing.role is Role.SITE]
+    buildings = np.array([thing.geometry for thing in things if thing.role is Role.BUILDING])
     offsets_m = grid_offset_m(own or buildings[shapely.intersects(buildings, box)].tolist())
     corner_m, counts = [], []
     for low_m, high_m, offset_m in zip((left, bottom), (right, top), offsets_m, strict=True):
@@ -286,13 +290,13 @@ def _bounds_m(
         far = low + size
         return float(low[0]), float(low[1]), float(far[0]), float(far[1])
     chief = _chief(things)
-    bounds_m = shapely.total_bounds([each.geometry for each in chief])
+    bounds_m = shapely.total_bounds([thing.geometry for thing in chief])
     margin_m = options.margin_m
     if chief[0].role is Role.SITE:
         margin_m = 0.0
     elif margin_m is None:
         margin_m = _margin_m(site_map, things, bounds_m)
-    left, bottom, right, top = (float(each) for each in bounds_m)
+    left, bottom, right, top = (float(bound_m) for bound_m in bounds_m)
     return left - margin_m, bottom - margin_m, right + margin_m, top + margin_m
 
 
@@ -301,10 +305,10 @@ def _margin_m(site_map: SiteMap, things: Sequence[Thing], bounds_m: FloatArray) 
 
     A wider margin is a guess in the ledger.
     """
-    streets = [each for each in things if each.role is Role.CHARGE]
-    if site_map.options.charge_at or not streets or not all(each.is_line for each in streets):
+    streets = [thing for thing in things if thing.role is Role.CHARGE]
+    if site_map.options.charge_at or not streets or not all(street.is_line for street in streets):
         return MARGIN_M
-    lines = [shapely.union_all(list(each.kerbs)) for each in streets]
+    lines = [shapely.union_all(list(street.kerbs)) for street in streets]
     for margin_m in np.arange(MARGIN_M, MOST_MARGIN_M + 1.0):
         inside_m = margin_m - _TO_BORDER_M
         box = shapely.box(*(bounds_m + inside_m * np.array([-1.0, -1.0, 1.0, 1.0])))

@@ -109,25 +109,25 @@ class SiteMap:
         Args:
             used: The kinds of those used on the site, by their places in the file.
         """
-        bounds = shapely.bounds([each.geometry for each in self.features]).reshape(-1, 4)
+        bounds = shapely.bounds([feature.geometry for feature in self.features]).reshape(-1, 4)
         middles = 0.5 * (bounds[:, :2] + bounds[:, 2:])
         positions = {
-            each.place: (float(x), float(y))
-            for each, (x, y) in zip(self.features, middles, strict=True)
+            feature.place: (float(x), float(y))
+            for feature, (x, y) in zip(self.features, middles, strict=True)
             if x == x
         }
         self.ledger.entries = list(_one_fate_each(self.ledger.entries, set(used)))
-        fates = {each.place for each in self.ledger.of(*FATES)}
-        for place in dict.fromkeys(each.place for each in self.features):
+        fates = {entry.place for entry in self.ledger.of(*FATES)}
+        for place in dict.fromkeys(feature.place for feature in self.features):
             if place in used:
                 self.ledger.add(Fate.READ, used[place], place)
             elif place not in fates:
                 self.ledger.add(Fate.LEFT_OUT, _UNUSED, place)
-        elsewhere = {each.place for each in self.ledger.of(Fate.PASSED)}
+        elsewhere = {entry.place for entry in self.ledger.of(Fate.PASSED)}
         self.ledger.entries = [
-            replace(each, position=positions.get(each.place))
-            for each in self.ledger.entries
-            if each.fate is not Fate.GUESSED or each.place not in elsewhere
+            replace(entry, position=positions.get(entry.place))
+            for entry in self.ledger.entries
+            if entry.fate is not Fate.GUESSED or entry.place not in elsewhere
         ]
 
     def check_coordinates(self) -> None:
@@ -136,7 +136,7 @@ class SiteMap:
         Raises:
             BlastEnvError: If it has one.
         """
-        geometries = [each.geometry for each in self.features]
+        geometries = [feature.geometry for feature in self.features]
         coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
         is_wrong = ~(np.abs(coordinates) <= MOST_COORDINATE)
         if is_wrong.any():

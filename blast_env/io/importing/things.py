@@ -206,10 +206,10 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
         BlastEnvError: If a selector chooses nothing.
     """
     selectors, reader = _selectors(site_map), HeightReader.of(site_map)
-    roles = [_role(each, selectors, site_map) for each in site_map.features]
+    roles = [_role(item, selectors, site_map) for item in site_map.features]
     known = ("kind", "highway", "layer", *_BUILDING_KEYS)
-    if not selectors and not any(key in each.tags for each in site_map.features for key in known):
-        roles = [Role.BUILDING if _may_be_building(each) else None for each in site_map.features]
+    if not selectors and not any(key in item.tags for item in site_map.features for key in known):
+        roles = [Role.BUILDING if _may_be_building(item) else None for item in site_map.features]
     wholes = {
         str(feature.tags["id"]): feature.place
         for feature, role in zip(site_map.features, roles, strict=True)

@@ -78,14 +78,14 @@ class _Places:
 
     def __init__(self, things: Sequence[Thing], level_m: float) -> None:
         self._things, self._level_m = things, level_m
-        self._tree = shapely.STRtree([each.geometry for each in things])
+        self._tree = shapely.STRtree([thing.geometry for thing in things])
         self._below = [self._support(k) for k in range(len(things))]
         roots = [
-            each
-            for each, below in zip(things, self._below, strict=True)
-            if below is None and each.height_m is not None
+            thing
+            for thing, below in zip(things, self._below, strict=True)
+            if below is None and thing.height_m is not None
         ]
-        self._has_zero = any(not each.has_z or self._is_near_zero(each) for each in roots)
+        self._has_zero = any(not root.has_z or self._is_near_zero(root) for root in roots)
 
     def grounds(self) -> list[tuple[float, str]]:
         """Return the height of the ground under each building, and what the ledger says of it."""
