@@ -17,9 +17,6 @@ LARGE_SITES: Final = "large_sites"
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
 """All of them."""
 
-REAL_SIZE: Final = frozenset({"street_front", "government_forecourt", "campus", "car_park"})
-"""Bundled scenarios of 90 to 120 m; tracks and studies use them only by name."""
-
 
 def bundled_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package."""

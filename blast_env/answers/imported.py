@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from blast_env.answers.document import AnyPart, Line, Table, lines, titled
 
 if TYPE_CHECKING:  # maps need the extra `maps`
-    from blast_env.io.importing import ImportedSite
+    from blast_env.io.importing import SiteImport
 
 _HEADERS: Final = (
     *("building", "protected", "parts", "height (m)", "area (m2)", "modules (m2)"),
@@ -15,7 +15,7 @@ _HEADERS: Final = (
 )
 
 
-def import_answer(imported: "ImportedSite") -> Iterator[AnyPart]:
+def import_answer(imported: "SiteImport") -> Iterator[AnyPart]:
     """Yield the table of the buildings of an imported site, the sums of its ledger, and notes."""
     width_m, height_m = imported.site.size_m
     rows = [

@@ -12,11 +12,11 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from blast_env.app.kept import StoredRecord, read_kept, write_kept
+from blast_env.app.kept import FileRecord, read_kept, write_kept
 from blast_env.app.work import BlastingTask, StatusWriter
 from blast_env.evaluation import BlastStore, LoadCase
 from blast_env.evaluation.campaign import Campaign
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult, RecordedBlast
+from blast_env.evaluation.engines.gas import BlastMeasurement, GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.gas.engine import Recorders
 from blast_env.geometry import Layout
@@ -43,7 +43,7 @@ _LEAST_SHOWN: Final = 0.05  # of the end of a film's scale
 _QUALITY: Final = 82
 
 
-class Scale(StoredRecord):
+class Scale(FileRecord):
     """The colour scales of all blasts of one threat.
 
     Attributes:
@@ -71,7 +71,7 @@ def warm_engine() -> None:
     GasBlast(load_scenario("control_room"), engine=GasEngine(cells="coarse")).run()
 
 
-class Picture(StoredRecord):
+class Picture(FileRecord):
     """A picture of a blast: its file, its label and what it shows."""
 
     file: str
@@ -79,7 +79,7 @@ class Picture(StoredRecord):
     kind: Literal["film", "map", "walls", "gauge"]
 
 
-class BlastPictures(StoredRecord):
+class BlastPictures(FileRecord):
     """The pictures of a blast; written last, the file marks a complete blast.
 
     Attributes:
@@ -156,7 +156,7 @@ class _BlastDrawing:
         self._planes = PlaneRecorder(blast)
         return lambda grid: (*self._planes.recorders(grid), *ground_recorders(grid))
 
-    def draw(self, found: RecordedBlast) -> None:
+    def draw(self, found: BlastMeasurement) -> None:
         """Draw film, maps, walls and gauges."""
         folder, result = self._folder, found.result
         make_folder(folder)

@@ -15,7 +15,7 @@ MOST_BYTES: Final = 50_000_000
 """Largest size of a file of the work folder."""
 
 
-class StoredRecord(BaseModel):
+class FileRecord(BaseModel):
     """Base of the records in files: frozen; missing numbers are NaN."""
 
     model_config = ConfigDict(
@@ -27,10 +27,10 @@ class StoredRecord(BaseModel):
     )
 
 
-AnyKept = TypeVar("AnyKept", bound=StoredRecord)
+AnyKept = TypeVar("AnyKept", bound=FileRecord)
 
 
-class DesignSettings(StoredRecord):
+class DesignSettings(FileRecord):
     """The settings of a design's page, which its history does not have.
 
     Attributes:
@@ -44,7 +44,7 @@ class DesignSettings(StoredRecord):
     view: str = "Plan"
 
 
-def write_kept(record: StoredRecord, path: Path) -> None:
+def write_kept(record: FileRecord, path: Path) -> None:
     """Write a record, the whole file or none.
 
     Raises:

@@ -49,7 +49,7 @@ _DPI: Final = 100
 
 
 @dataclass(frozen=True)
-class ShownLayout:
+class LayoutView:
     """A layout with a blast to show beside others.
 
     Attributes:
@@ -405,7 +405,8 @@ class Session:
             for layout in layouts
             if all(coarser.known(layout, threat) is None for threat in threats)
         ]
-        return (coarser.engine.cost(self.scenario, threats[0].charge),) * len(missing)  # type: ignore[return-value]
+        cost = coarser.engine.cost(self.scenario, threats[0].charge)
+        return () if cost is None else (cost,) * len(missing)
 
     @property
     def engine(self) -> GasEngine:
@@ -440,13 +441,13 @@ class Session:
 
     # Results.
 
-    def shown(self, threat: LoadCase) -> tuple[ShownLayout, ...]:
+    def shown(self, threat: LoadCase) -> tuple[LayoutView, ...]:
         """Return the layouts with the keys of their blasts under a threat, no barrier first.
 
         Empty layouts are left out: they equal no barrier.
         """
         return tuple(
-            ShownLayout(name, layout, self.key(layout, threat))
+            LayoutView(name, layout, self.key(layout, threat))
             for name, layout in self._layouts.items()
         )
 
@@ -509,7 +510,7 @@ class Session:
             if (own := self.judged(part, threat))
         ]
 
-    def judged(self, shown: ShownLayout, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
+    def judged(self, shown: LayoutView, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
         """Return the response of the buildings with their current facades to a blast."""
         if not any(structure.facade for structure in self.scenario.structures):
             return ()
@@ -521,13 +522,13 @@ class Session:
             self._judged[known] = building_verdicts(found)
         return self._judged[known]
 
-    def damage_png(self, shown: ShownLayout, threat: LoadCase, building: str) -> bytes | None:
+    def damage_png(self, shown: LayoutView, threat: LoadCase, building: str) -> bytes | None:
         """Return the picture of a building's damage; `None` without the histories on its bays."""
         found = self._consequences(shown, threat)
         own = () if found is None else (x for x in found.responses if x.building == building)
         return next(map(damage_png, own), None)
 
-    def _consequences(self, shown: ShownLayout, threat: LoadCase) -> Consequences | None:
+    def _consequences(self, shown: LayoutView, threat: LoadCase) -> Consequences | None:
         record = self._campaign({}).evaluator.known(shown.layout, threat)
         if record is None:
             return None

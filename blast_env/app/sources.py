@@ -17,7 +17,7 @@ from blast_env.response.facade import STOREY_M
 from blast_env.site import SCHEMA_VERSION, Scenario, load_scenario
 
 if TYPE_CHECKING:
-    from blast_env.io.importing import ImportedSite, ImportOptions
+    from blast_env.io.importing import ImportOptions, SiteImport
     from blast_env.io.importing.convert import MapSketch
 
 Made = TypeVar("Made")
@@ -62,7 +62,7 @@ def is_map(name: str) -> bool:
     return Path(name).suffix.lower() in MAPS
 
 
-def imported_site(path: Path, options: "ImportOptions") -> "ImportedSite":
+def imported_site(path: Path, options: "ImportOptions") -> "SiteImport":
     """Return the site of a map or drawing, and its deviations.
 
     Args:

@@ -8,7 +8,7 @@ from time import monotonic, time
 from typing import Any, Final, Literal, TypeAlias
 
 from blast_env.answers.document import Document
-from blast_env.app.kept import MOST_BYTES, StoredRecord, write_kept
+from blast_env.app.kept import MOST_BYTES, FileRecord, write_kept
 from blast_env.documents import check_values, read_text
 from blast_env.evaluation import LoadCase
 from blast_env.gas.settings import Cells
@@ -23,7 +23,7 @@ _LEAST_PAUSE_S: Final = 0.1
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
-class Status(StoredRecord):
+class Status(FileRecord):
     """The progress of work.
 
     Attributes:
@@ -149,7 +149,7 @@ class Question(StrEnum):
     ADVISE = "advise"
 
 
-class Answer(StoredRecord):
+class Answer(FileRecord):
     """The answer to a question.
 
     Attributes:

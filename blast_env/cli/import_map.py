@@ -18,7 +18,7 @@ from blast_env.site import save_scenario
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from blast_env.io.importing import ImportedSite
+    from blast_env.io.importing import SiteImport
 
 _PLACE: Final = (
     "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
@@ -160,7 +160,7 @@ def _options(context: typer.Context) -> ImportOptions:
     return ImportOptions(**{name: value for name, value in values.items() if name in known})
 
 
-def _plan(imported: "ImportedSite") -> "Figure":
+def _plan(imported: "SiteImport") -> "Figure":
     from blast_env.io.imported_site import imported_plan
 
     return imported_plan(imported)

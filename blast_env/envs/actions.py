@@ -169,7 +169,7 @@ class ActionChoice:
 
 
 @dataclass(frozen=True, eq=False)
-class NumberedActions:
+class ActionNumbers:
     """The numbered actions for a catalogue: the options of each choice in turn, then to finish.
 
     Attributes:
@@ -189,7 +189,7 @@ class NumberedActions:
     @classmethod
     def of(
         cls, actions: Actions, scenario: Scenario, sources: tuple[AnySource, ...] = ()
-    ) -> "NumberedActions":
+    ) -> "ActionNumbers":
         """Return the actions for a scenario.
 
         Args:
@@ -202,9 +202,9 @@ class NumberedActions:
         *first, finish = np.cumsum([0, *counts]).tolist()
         return cls(scenario, sources or scenario.charge, choices, tuple(first), finish)
 
-    def with_sources(self, sources: tuple[AnySource, ...]) -> "NumberedActions":
+    def with_sources(self, sources: tuple[AnySource, ...]) -> "ActionNumbers":
         """Return the actions for other places of the charge, as shown to the agent."""
-        other = NumberedActions(self.scenario, sources, self.choices, self.first, self.finish)
+        other = ActionNumbers(self.scenario, sources, self.choices, self.first, self.finish)
         vars(other)["are_plain"] = self.are_plain
         if not self.are_plain:
             vars(other)["_places"] = self._places

@@ -12,11 +12,11 @@ from gymnasium import spaces
 from gymnasium.vector.utils import concatenate, create_empty_array
 from numpy.typing import NDArray
 
-from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
+from blast_env.envs.actions import ActionChoice, ActionNumbers, Actions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observable import (
     MASK,
-    BatchedObservation,
+    BatchObservation,
     EpisodeObservation,
     Observable,
     Observation,
@@ -43,7 +43,7 @@ from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.batch import LayoutBatch, PlacementRules
-from blast_env.layout.placement import CheckedLayout
+from blast_env.layout.placement import LegalLayout
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
@@ -146,7 +146,7 @@ class _Shown:
 
     observable: Observable
     observation: EpisodeObservation
-    actions: NumberedActions
+    actions: ActionNumbers
     charges: tuple[AnyCharge, ...]
     case: LoadCaseSet | None
 
@@ -169,7 +169,7 @@ class _Site:
     evaluator: BlastEvaluator
     empty: LayoutState
     rules: PlacementRules
-    actions: NumberedActions
+    actions: ActionNumbers
     terms: Terms
     shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
@@ -193,7 +193,7 @@ class _Site:
             task.evaluator(scenario),
             empty,
             PlacementRules.of(empty),
-            NumberedActions.of(task.actions, scenario),
+            ActionNumbers.of(task.actions, scenario),
             dict.fromkeys((*names, ILLEGAL_TERM), 0.0),
         )
 
@@ -215,7 +215,7 @@ class _Site:
         observation = task.observation.episode(observable)
         case = None if task.engine.has_noise else task.case(self.empty.scenario, charges)
         made = _Shown(observable, observation, self.actions.with_sources(sources), charges, case)
-        if isinstance(observation, BatchedObservation):  # others may keep a state
+        if isinstance(observation, BatchObservation):  # others may keep a state
             _keep(self.shown, charges, made)
         return made
 
@@ -419,7 +419,7 @@ class Episodes:
 
         Args:
             indices: The episodes.
-            actions: One of its `NumberedActions` for each.
+            actions: One of its `ActionNumbers` for each.
         """
         layouts = self.layouts
         made = [*map(self._made, indices, actions)]
@@ -434,7 +434,7 @@ class Episodes:
             episode = self.running[index]
             before = after = episode.transition.after
             if type(found) is int and found >= 0:
-                after = CheckedLayout(layouts.layouts[index])
+                after = LegalLayout(layouts.layouts[index])
                 after.scenario = layouts.rules[index].scenario
             stops = found == _FINISHES
             if found is None:
@@ -535,7 +535,7 @@ class Episodes:
         episodes = [self.running[index] for index in indices]
         observations = [episode.shown.observation for episode in episodes]
         kind = observations[0]
-        if not isinstance(kind, BatchedObservation):
+        if not isinstance(kind, BatchObservation):
             own: list[Any] = [self._observed(index) for index in indices]
             empty: Any = create_empty_array(space, len(own))
             return concatenate(space, own, empty)

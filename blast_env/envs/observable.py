@@ -106,7 +106,7 @@ class EpisodeObservation(Protocol):
         """Return a new element of the space, for the modules placed so far."""
 
 
-class BatchedObservation(ABC):
+class BatchObservation(ABC):
     """Observes one episode, or several of them in one array; keeps no state between placements."""
 
     @staticmethod

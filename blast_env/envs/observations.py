@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.envs.observable import (
     Array,
-    BatchedObservation,
+    BatchObservation,
     Observable,
     Observation,
     Plane,
@@ -145,7 +145,7 @@ class FeaturesObservation:
 
 
 @dataclass(frozen=True, eq=False)
-class FeaturesEpisode(BatchedObservation):
+class FeaturesEpisode(BatchObservation):
     """The vector of one episode.
 
     Attributes:
@@ -275,7 +275,7 @@ class DictObservation:
 
 
 @dataclass(frozen=True, eq=False)
-class DictEpisode(BatchedObservation):
+class DictEpisode(BatchObservation):
     """The dictionaries of one episode.
 
     Attributes:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.observable import (
     Array,
-    BatchedObservation,
+    BatchObservation,
     Observable,
     Plane,
     VehicleView,
@@ -299,7 +299,7 @@ class GridObservation:
 
 
 @dataclass(frozen=True, eq=False)
-class GridEpisode(BatchedObservation):
+class GridEpisode(BatchObservation):
     """The planes of one episode.
 
     Attributes:
@@ -450,7 +450,7 @@ class ImageObservation:
 
 
 @dataclass(frozen=True, eq=False)
-class ImageEpisode(BatchedObservation):
+class ImageEpisode(BatchObservation):
     """The images of one episode.
 
     Attributes:

@@ -149,21 +149,8 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
-        # (1) A key per pair, equal for equal blasts; (2) what the store has; (3) run the rest, each
-        # blast kept as soon as it is done, so that an interruption loses only those under way; (4)
-        # back in the order of the pairs.
-        asked, keys, layouts = self._asked(pairs, processes)
-        stored = ((key, self.store.get(key, self.scenario)) for key in asked)
-        found = {key: loads for key, loads in stored if loads is not None}
-        missing = {key: (self, charge) for key, charge in asked.items() if key not in found}
-        for done, (key, loads) in enumerate(_run(missing, processes), start=1):
-            found[key] = loads
-            if progress is not None:
-                progress(1.0 - (len(missing) - done) / len(keys))
-        self.counts.cache_hits += len(keys) - len(missing)
-        return [
-            self._responding(found[key], layout) for key, layout in zip(keys, layouts, strict=True)
-        ]
+        asked = [(self, layout, threat) for layout, threat in pairs]
+        return loads_together(asked, processes, progress)
 
     def records_of_many(
         self,
@@ -207,7 +194,7 @@ class BlastEvaluator:
                 progress(1.0 - (len(missing) - done) / len(missing))
         self.counts.cache_hits += len(keys) - len(missing)
         return [
-            replace(found[key], loads=self._responding(found[key].loads, layout))
+            replace(found[key], loads=self.responding(found[key].loads, layout))
             for key, layout in zip(keys, layouts, strict=True)
         ]
 
@@ -224,19 +211,21 @@ class BlastEvaluator:
             asked.setdefault(keys[-1], threat.charge)
         return asked, keys, layouts
 
-    def _responding(self, loads: BlastLoads, layout: Layout) -> BlastLoads:
+    def responding(self, loads: BlastLoads, layout: Sequence[Element]) -> BlastLoads:
         """Return loads with the response of the facades, where the objective counts that."""
         objective = self.scenario.objective
         if objective.kind != "response":
             return loads
-        return loads.with_facades(self.scenario.named_bays(layout), objective)
+        return loads.with_facades(
+            self.scenario.named_bays(check_layout(self.scenario, layout)), objective
+        )
 
     def known(self, layout: Sequence[Element], threat: LoadCase) -> BlastRecord | None:
         """Return the complete record of a blast if it is stored."""
         found = self.store.record(self.key(layout, threat), self.scenario)
         if found is None:
             return None
-        return replace(found, loads=self._responding(found.loads, tuple(layout)))
+        return replace(found, loads=self.responding(found.loads, tuple(layout)))
 
     def keep(self, layout: Sequence[Element], threat: LoadCase, loads: BlastLoads) -> None:
         """Cache and count the loads of a blast that ran elsewhere, with the same engine.
@@ -284,12 +273,18 @@ def _run(
 
 
 def loads_together(
-    asked: Sequence[tuple[BlastEvaluator, Layout, LoadCase]], processes: int = 1
+    asked: Sequence[tuple[BlastEvaluator, Sequence[Element], LoadCase]],
+    processes: int = 1,
+    progress: Callable[[float], None] | None = None,
 ) -> list[BlastLoads]:
     """Return the loads of blasts on several sites by one engine, run in one batch.
 
-    They are those of `BlastEvaluator.loads_of_many`, whose errors are the same.
+    Arguments and errors are those of `BlastEvaluator.loads_of_many`.
     """
+    # (1) A key per blast, equal for equal blasts; (2) what the store has; (3) run the rest, each
+    # blast kept as soon as it is done, so that an interruption loses only those under way; (4) back
+    # in the order asked for.
+    check_workers("processes", processes)
     keys = [evaluator.key(layout, threat) for evaluator, layout, threat in asked]
     found: dict[BlastKey, BlastLoads] = {}
     missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
@@ -301,16 +296,16 @@ def loads_together(
             missing[key] = evaluator, threat.charge
         else:
             found[key] = known
+    for done, (key, loads) in enumerate(_run(missing, processes), start=1):
+        found[key] = loads
+        if progress is not None:
+            progress(1.0 - (len(missing) - done) / len(keys))
     if asked:
         asked[0][0].counts.cache_hits += len(keys) - len(missing)
-    found.update(_run(missing, processes))
-    loads = []
-    for key, (evaluator, layout, _) in zip(keys, asked, strict=True):
-        objective, own = evaluator.scenario.objective, found[key]
-        if objective.kind == "response":
-            own = own.with_facades(evaluator.scenario.named_bays(layout), objective)
-        loads.append(own)
-    return loads
+    return [
+        evaluator.responding(found[key], layout)
+        for key, (evaluator, layout, _) in zip(keys, asked, strict=True)
+    ]
 
 
 def engine_text(engine: Engine) -> str:
@@ -432,7 +427,7 @@ class Assessment:
 class DesignProblem:
     """A case to find a layout for, the evaluator that runs its blasts, and their budget.
 
-    It serves searches, rewards and the benchmark.
+    It serves searches and the benchmark.
 
     Attributes:
         evaluator: Runs the blasts and caches their loads.
@@ -523,7 +518,7 @@ class DesignProblem:
 
     def loads_with(self, layout: Sequence[Element]) -> list[BlastLoads]:
         """Return the loads with a layout, one per threat; errors as for `loads`."""
-        cells = layout if isinstance(layout, tuple) else tuple(layout)  # may be a CheckedLayout
+        cells = layout if isinstance(layout, tuple) else tuple(layout)  # may be a LegalLayout
         pairs = [(cells, threat) for threat in self.threats]
         self.spend(pairs)
         return self.evaluator.loads_of_many(pairs, self.processes)

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cbrt, ceil
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,22 +168,13 @@ class GasRun:
     def _solver(self, recorders: Sequence[Recorder], settling: Settling) -> Gas:
         """Return the solver with the expanded charge."""
         settings, charge = self.settings, self.charge
+        make: Callable[..., Any] = GasSolver
+        expand: Callable[[Any, GasCharge, float], None] = set_charge
         if settings.is_adaptive:
-            refined = RefinedSolver(
-                self.grid,
-                settings.levels,
-                faces=self.table.faces,
-                recorders=recorders,
-                with_fuel=True,
-                burning=charge.burning,
-                settling=settling,
-                threads=settings.threads,
-                followed=partial(_reaches_early, _watched_boxes(self.site, settings.until), charge),
-            )
-            with _notice():
-                set_refined_charge(refined, charge, self.remap_radius_m)
-            return refined
-        solver = GasSolver(
+            followed = partial(_reaches_early, _watched_boxes(self.site, settings.until), charge)
+            make = partial(RefinedSolver, levels=settings.levels, followed=followed)
+            expand = set_refined_charge
+        solver: Gas = make(
             self.grid,
             faces=self.table.faces,
             recorders=recorders,
@@ -193,7 +184,7 @@ class GasRun:
             threads=settings.threads,
         )
         with _notice():
-            set_charge(solver, charge, self.remap_radius_m)
+            expand(solver, charge, self.remap_radius_m)
             doubled_s = [charge.profile(run_m).time_s for run_m in settings.doubled_m]
         return CoarseningSolver(solver, doubled_s) if doubled_s else solver
 

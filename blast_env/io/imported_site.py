@@ -6,7 +6,7 @@ from typing import Final
 
 import shapely
 
-from blast_env.io.importing import ImportedSite
+from blast_env.io.importing import SiteImport
 from blast_env.plots.plan import INK, Feature, FeatureKind, Look, site_features
 from blast_env.plots.site_picture import plan_figure
 from blast_env.plots.site_plan import draw_features, legend_of
@@ -18,7 +18,7 @@ with render_extra():
 _ON_MAP: Final = FeatureKind("on_map", "outline on the map", 3.5, Look(INK, 1.3))
 
 
-def imported_plan(imported: ImportedSite) -> Figure:
+def imported_plan(imported: SiteImport) -> Figure:
     """Return the plan of an imported site: filled modules, with the outlines on the map as lines.
 
     North is marked, and each building has its name and the deviation of its modules.
@@ -40,7 +40,7 @@ def imported_plan(imported: ImportedSite) -> Figure:
     return figure
 
 
-def _features(imported: ImportedSite) -> Iterator[Feature]:
+def _features(imported: SiteImport) -> Iterator[Feature]:
     """Yield the features of the site, buildings as modules with the deviation in the label."""
     deviations = {
         part: f"{building.deviation.area_share:.1%}, {building.deviation.outline_m:.2f} m"

@@ -127,7 +127,9 @@ def build_site(
         ValueError: If the seed is negative.
     """
     placement = LayoutState.of(scenario, layout)
-    if isinstance(charge, Charge):  # a vehicle keeps clear of all obstacles
+    # The scenario and the layout are sound with the scenario's own charges, and a vehicle keeps
+    # clear of all obstacles: only a charge from elsewhere is checked here.
+    if isinstance(charge, Charge) and not scenario.may_have(charge):
         _check_clear(scenario.with_charge(charge), placement)
     drawn = draw_threat(scenario, seed) if charge is None else charge
     charge = charge_against(scenario, placement.layout, drawn)

@@ -29,7 +29,7 @@ from blast_env.site.zone import (
 from blast_env.vehicles.access_way import closing_places, is_open
 
 
-class CheckedLayout(tuple[Element, ...]):
+class LegalLayout(tuple[Element, ...]):
     """A layout that was checked against all conditions of a build zone.
 
     It equals the plain tuple; see `LayoutState.checked`.
@@ -86,9 +86,9 @@ class LayoutState:
         return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
 
     @cached_property
-    def checked(self) -> CheckedLayout:
+    def checked(self) -> LegalLayout:
         """The layout, marked as checked by `of` and `place`."""
-        layout = CheckedLayout(self.layout)
+        layout = LegalLayout(self.layout)
         layout.scenario = self.scenario
         return layout
 
@@ -163,7 +163,15 @@ class LayoutState:
         Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
         (1, 0, 0) without a build zone.
         """
-        legal: BoolArray = _legal_of([self])[0]
+        cells, item_of = self._empty_zone, [variant.item for variant in self.catalogue.variants]
+        legal = cells.places(cells.usable & (self.occupancy == 0))
+        if self._zone.budget is not None:
+            legal &= cells.costs <= self._spendable
+        in_stock = np.array(self.stocks_left)[item_of] > 0
+        legal &= in_stock[:, np.newaxis, np.newaxis]
+        if self._closing is not None:
+            legal &= ~self._closing
+        legal.flags.writeable = False
         return legal
 
     @cached_property
@@ -446,35 +454,6 @@ class LayoutState:
         return LayoutState, (self.scenario, self.layout)
 
 
-def find_legal(placements: Iterable[LayoutState]) -> None:
-    """Compute `LayoutState.legal` of placements, of those on one site in one array."""
-    of_sites: dict[int, list[LayoutState]] = {}
-    for item in placements:
-        if "legal" not in vars(item):
-            of_sites.setdefault(id(item.scenario), []).append(item)
-    for own in of_sites.values():
-        for placement, legal in zip(own, _legal_of(own), strict=True):
-            vars(placement)["legal"] = legal
-
-
-def _legal_of(placements: Sequence[LayoutState]) -> BoolArray:
-    """Return `LayoutState.legal` of states of one site (states, variants, rows, columns)."""
-    cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
-    taken = np.array([placement.occupancy for placement in placements]) > 0
-    legal = cells.places(cells.usable & ~taken)
-    if placements[0]._zone.budget is not None:
-        spendable = np.array([placement._spendable for placement in placements])
-        legal &= cells.costs <= spendable[:, np.newaxis, np.newaxis, np.newaxis]
-    left = np.array([placement.stocks_left for placement in placements])
-    of_variants = left[:, [variant.item for variant in catalogue.variants]]
-    legal &= (of_variants > 0)[..., np.newaxis, np.newaxis]
-    for own, placement in zip(legal, placements, strict=True):
-        if placement._closing is not None:
-            own &= ~placement._closing
-    legal.flags.writeable = False
-    return legal
-
-
 def _placed_one_by_one(empty: LayoutState, layout: Layout) -> LayoutState:
     """Place a layout in order, or raise the error of the first illegal element."""
     placement = empty
@@ -545,7 +524,7 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
     Raises:
         LayoutError: As `LayoutState.of`, if an element cannot be placed.
     """
-    if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
+    if isinstance(layout, LegalLayout) and layout.scenario is scenario:
         return layout
     if isinstance(layout, tuple) and not layout:
         return ()

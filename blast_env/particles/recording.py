@@ -5,7 +5,7 @@ from typing import Final
 
 from blast_env.particles.tables import (
     COLLISION_COLUMNS,
-    RecordedBlast,
+    BlastTables,
     modules_in_pa_s,
     structures_in_pa_s,
 )
@@ -18,9 +18,7 @@ _UNITS: Final = (
 )
 
 
-def write_blast(
-    blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
-) -> Path:
+def write_blast(blast: BlastTables, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS) -> Path:
     """Write a workbook with the sheets `Run`, `Structures`, `Modules`, `Collisions`, `Columns`.
 
     Args:

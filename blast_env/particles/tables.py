@@ -16,7 +16,7 @@ from blast_env.tables import Column, RunRecord, as_types, texts
 Columns = tuple[Column, ...]
 
 
-class RecordedBlast(Protocol):
+class BlastTables(Protocol):
     """The written part of a blast: its tables, and the record to repeat it."""
 
     @property

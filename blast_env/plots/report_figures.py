@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.engines.gas import GasBlast, RecordedBlast
+from blast_env.evaluation.engines.gas import BlastMeasurement, GasBlast
 from blast_env.evaluation.questions.verdict import BuildingResponse, response_to
 from blast_env.gas.engine import Recorders
 from blast_env.geometry import Element, Layout
@@ -81,7 +81,7 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
 # A threat.
 
 
-class Drawn(NamedTuple):
+class Drawing(NamedTuple):
     """A picture of a threat.
 
     Attributes:
@@ -103,14 +103,14 @@ class ThreatPictures:
     """
 
     def __init__(self) -> None:
-        self._unprotected: RecordedBlast | None = None
-        self.pictures: tuple[Drawn, ...] = ()
+        self._unprotected: BlastMeasurement | None = None
+        self.pictures: tuple[Drawing, ...] = ()
 
     def recorders(self, _: GasBlast) -> Recorders:
         """Return what makes the recorders of the ground."""
         return ground_recorders
 
-    def draw(self, found: RecordedBlast) -> None:
+    def draw(self, found: BlastMeasurement) -> None:
         """Keep the first blast until the second one, and draw both."""
         if self._unprotected is None:
             self._unprotected = found
@@ -119,7 +119,7 @@ class ThreatPictures:
         self.pictures = (*damage_pictures(*both), risk_picture(*both), *blast_pictures(*both))
 
 
-def blast_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Iterator[Drawn]:
+def blast_pictures(unprotected: BlastMeasurement, protected: BlastMeasurement) -> Iterator[Drawing]:
     """Yield the unfolded facades of the protected buildings, and the histories on them."""
     structures = protected.result.blast.scenario.structures
     for name, parts in buildings_of(structures).items():
@@ -129,10 +129,10 @@ def blast_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Iter
         yield _history(unprotected, protected, name)
         for quantity, kind in KINDS.items():
             figure = facades(protected.result, name, quantity, unprotected.result)
-            yield Drawn(f"{name}: {kind.name}, walls unfolded", png(figure))
+            yield Drawing(f"{name}: {kind.name}, walls unfolded", png(figure))
 
 
-def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str) -> Drawn:
+def _history(unprotected: BlastMeasurement, protected: BlastMeasurement, building: str) -> Drawing:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
     wall = unprotected.record.complete.buildings[building].wall
     figure, axes = _page(2.6)
@@ -156,10 +156,12 @@ def _history(unprotected: RecordedBlast, protected: RecordedBlast, building: str
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9, frameon=False)
-    return Drawn(f"{building}: overpressure over time, mean over its {wall} wall", png(figure))
+    return Drawing(f"{building}: overpressure over time, mean over its {wall} wall", png(figure))
 
 
-def damage_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Iterator[Drawn]:
+def damage_pictures(
+    unprotected: BlastMeasurement, protected: BlastMeasurement
+) -> Iterator[Drawing]:
     """Yield pictures of the damage to facades, without the layout and with it.
 
     They are the unfolded facades and the pressure-impulse diagram of each building.
@@ -167,19 +169,19 @@ def damage_pictures(unprotected: RecordedBlast, protected: RecordedBlast) -> Ite
     words = "no barrier", "layout"
     for own in zip(_responses(unprotected), _responses(protected), strict=True):
         name, rows = own[0].building, list(zip(words, own, strict=True))
-        yield Drawn(f"{name}: facades unfolded", png(facade_picture(rows, name)), is_facade=True)
+        yield Drawing(f"{name}: facades unfolded", png(facade_picture(rows, name)), is_facade=True)
         points = [(side, response.facade) for side, response in rows]
         diagram = pressure_impulse_diagram(points, name)
-        yield Drawn(f"{name}: pressure-impulse diagram", png(diagram))
+        yield Drawing(f"{name}: pressure-impulse diagram", png(diagram))
 
 
-def _responses(found: RecordedBlast) -> tuple[BuildingResponse, ...]:
+def _responses(found: BlastMeasurement) -> tuple[BuildingResponse, ...]:
     blast = found.result.blast
     charge = found.result.run.site.charge
     return response_to(blast.scenario, tuple(blast.layout), charge, found.record).responses
 
 
-def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Drawn:
+def risk_picture(unprotected: BlastMeasurement, protected: BlastMeasurement) -> Drawing:
     """Return the map of risk to windows and eardrums.
 
     The map without the layout stands beside it if the charge is at the same place in both.
@@ -187,7 +189,7 @@ def risk_picture(unprotected: RecordedBlast, protected: RecordedBlast) -> Drawn:
     charges = (unprotected.result.run.site.charge, protected.result.run.site.charge)
     beside = unprotected.result if charges[0] == charges[1] else None
     figure = threshold_map(protected.result, beside)
-    return Drawn("risk to windows and eardrums, for the choice of assembly points", png(figure))
+    return Drawing("risk to windows and eardrums, for the choice of assembly points", png(figure))
 
 
 # The worth of items.

@@ -233,6 +233,19 @@ class Scenario(Content):
             raise BlastEnvError(f"charge is {value_text(charge)}, must be a Charge")
         return self._with_points((), (charge,))
 
+    def may_have(self, charge: Charge) -> bool:
+        """Return whether a charge is one of the scenario's own, at a place that was checked."""
+        try:
+            own = PointSource.at(charge)
+        except ValidationError:
+            return False
+        return any(
+            not isinstance(source, VehicleSource)
+            and (source.tnt_kg, source.height_m) == (own.tnt_kg, own.height_m)
+            and source.has_place(own.position_m)
+            for source in self.charge
+        )
+
     def with_possible_charges(self, charges: Sequence[AnyCharge]) -> "Scenario":
         """Return the scenario with further possible charges.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import hypot
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import (
     model_validator,
 )
 
+from blast_env.geometry import TOLERANCE_M
 from blast_env.hashing import HashMark
 from blast_env.sections import (
     Coordinate,
@@ -83,6 +85,10 @@ class PointSource(ChargeSource):
         """The point as a line without a length."""
         return (self.segment_m,)
 
+    def has_place(self, position_m: PointM) -> bool:
+        """Return whether it is the point."""
+        return position_m == self.position_m
+
     def sample_position_m(self, rng: np.random.Generator) -> PointM:  # noqa: ARG002
         """Return the point; nothing is drawn."""
         return self.position_m
@@ -105,6 +111,17 @@ class SegmentSource(ChargeSource):
         """The lines of the charge's places."""
         return (self.segment_m,)
 
+    def has_place(self, position_m: PointM) -> bool:
+        """Return whether the segment has a point, but for rounding."""
+        (x_m, y_m), (x0, y0), (x1, y1) = position_m, self.start_m, self.end_m
+        length_m = hypot(x1 - x0, y1 - y0)
+        if length_m <= TOLERANCE_M:
+            return position_m == self.start_m
+        along_m = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / length_m
+        aside_m = ((x_m - x0) * (y1 - y0) - (y_m - y0) * (x1 - x0)) / length_m
+        is_along = -TOLERANCE_M <= along_m <= length_m + TOLERANCE_M
+        return is_along and abs(aside_m) <= TOLERANCE_M
+
     def sample_position_m(self, rng: np.random.Generator) -> PointM:
         """Draw a point of the segment."""
         share = rng.random()
@@ -116,6 +133,12 @@ class RectangleSource(ChargeSource, Ground):
     """A charge uniformly distributed in a rectangle: a parking area."""
 
     kind: Literal["rectangle"]
+
+    def has_place(self, position_m: PointM) -> bool:
+        """Return whether the rectangle has a point, but for rounding."""
+        x_m, y_m = position_m
+        left, bottom, right, top = self.rectangle_m.grown(TOLERANCE_M)
+        return left <= x_m <= right and bottom <= y_m <= top
 
     def sample_position_m(self, rng: np.random.Generator) -> PointM:
         """Draw a point of the rectangle."""

@@ -25,7 +25,7 @@ from blast_env.geometry import Element
 from blast_env.response.damage import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.layers import SingleArray, first_sums, two_layers
-from blast_env.surrogate.pieces import Box, KnownPieces, Numbers, PointLayers
+from blast_env.surrogate.pieces import Box, Numbers, PieceKnowledge, PointLayers
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SurrogateSite
 from blast_env.surrogate.ways import SHARES
@@ -383,7 +383,7 @@ class Surrogate:
 
     def _met(
         self, site: SurrogateSite, approach: Approach, layouts: Sequence[Sequence[Box]]
-    ) -> tuple[KnownPieces, Numbers]:
+    ) -> tuple[PieceKnowledge, Numbers]:
         """Return what is known of the pieces of layouts under one charge, and their numbers."""
         kinds = self._of_loads if site.counts_peaks else self._of_loads[:1]
 
@@ -394,7 +394,7 @@ class Surrogate:
                 own.reshape(len(own), *related.shape[:2], MESSAGE).swapaxes(0, 1) for own in of_all
             ]
 
-        def make() -> KnownPieces:
+        def make() -> PieceKnowledge:
             of_shares = slice(FEATURES - SHARES, FEATURES)
             bounds = self.mean[of_shares], self.scale[of_shares], _MOST_SPREADS
             scaled = self.scaled(approach.on_empty)
@@ -402,14 +402,14 @@ class Surrogate:
                 networks.at_points(scaled, single_array.sum(axis=0))
                 for (networks, _), single_array in zip(kinds, sent(approach.solids), strict=True)
             ]
-            return KnownPieces(
+            return PieceKnowledge(
                 approach.ways, bounds, layers, lambda pieces: sent(approach.relations(pieces))
             )
 
         return site.memory.numbers_of((self, approach, site.counts_peaks), make, layouts)
 
     @staticmethod
-    def _starts(met: Sequence[tuple[Approach, KnownPieces, Numbers]]) -> IntArray:
+    def _starts(met: Sequence[tuple[Approach, PieceKnowledge, Numbers]]) -> IntArray:
         """Return the first row of each structure of each layout (layouts x structures,)."""
         found, first = [], 0
         for approach, known, layouts in met:

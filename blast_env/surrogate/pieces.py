@@ -49,7 +49,7 @@ class PointLayers(NamedTuple):
     last_bias: SingleArray
 
 
-class KnownPieces:
+class PieceKnowledge:
     """The structures of a site and the pieces met so far, for one charge.
 
     Args:
@@ -205,7 +205,7 @@ def _put_differs(
     end: Any,
     found: Any,
 ) -> None:
-    """Find the predictions at the points behind each layout; see `KnownPieces.differs`."""
+    """Find the predictions at the points behind each layout; see `PieceKnowledge.differs`."""
     members, points, width = base.shape
     inputs, length = first.shape[1], messages.shape[3]
     shares = np.empty((points, SHARES), dtype=np.float32)
@@ -248,7 +248,7 @@ class Memory:
 
     def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
         self._most_bytes = most_bytes
-        self._kept: dict[Hashable, KnownPieces] = {}
+        self._kept: dict[Hashable, PieceKnowledge] = {}
         self._bytes: dict[Hashable, int] = {}
         self._total_bytes = 0
 
@@ -259,9 +259,9 @@ class Memory:
     def numbers_of(
         self,
         key: Hashable,
-        make: Callable[[], KnownPieces],
+        make: Callable[[], PieceKnowledge],
         layouts: Sequence[Sequence[Box]],
-    ) -> tuple[KnownPieces, Numbers]:
+    ) -> tuple[PieceKnowledge, Numbers]:
         """Return the known pieces of a key, and the number of each piece of layouts.
 
         Args:

@@ -9,7 +9,7 @@ from typing import Final
 import shapely
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.convert import read_map
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.site_map import WGS84, SiteMap
@@ -84,7 +84,7 @@ def _surveyed(path: Path) -> Survey:
     raise error
 
 
-def _solids(site: ImportedSite) -> dict[str, tuple[float, float, float]]:
+def _solids(site: SiteImport) -> dict[str, tuple[float, float, float]]:
     """Return area, underside and top of the buildings, the parts of one together."""
     found: dict[str, tuple[float, float, float]] = {}
     for building in site.buildings:

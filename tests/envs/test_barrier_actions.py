@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
+from blast_env.envs.actions import ACTIONS, ActionChoice, ActionNumbers, ItemThenPlace
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.planes import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
@@ -33,11 +33,11 @@ def yard_env(**arguments: Any) -> BlastBarrierEnv:
     return BlastBarrierEnv(scenario=yard(), engine="gas", **arguments)
 
 
-def numbered(name: str, scenario: Scenario) -> NumberedActions:
-    return NumberedActions.of(ACTIONS[name], scenario)
+def numbered(name: str, scenario: Scenario) -> ActionNumbers:
+    return ActionNumbers.of(ACTIONS[name], scenario)
 
 
-def actions_for(actions: NumberedActions, placement: LayoutState, element: Element) -> list[int]:
+def actions_for(actions: ActionNumbers, placement: LayoutState, element: Element) -> list[int]:
     """Return the actions that place an element: at each choice, the one that leads there."""
     variant = placement.catalogue.variant_number(element)
     place = (variant, element[0], element[1])
@@ -95,7 +95,7 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
 
 def paid(env: BlastBarrierEnv, layout: Layout) -> tuple[list[float], dict[str, Any]]:
     env.reset(seed=0)
-    actions, rewards = NumberedActions.of(env.task.actions, env.placement.scenario), []
+    actions, rewards = ActionNumbers.of(env.task.actions, env.placement.scenario), []
     for element in layout:
         for action in actions_for(actions, env.placement, element):
             _, reward, ended, _, info = env.step(action)

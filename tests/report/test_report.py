@@ -32,7 +32,7 @@ from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, LoadCaseSet, StructureLoad
 from blast_env.evaluation.blasts import NO_BARRIER, Blasts
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult, RecordedBlast
+from blast_env.evaluation.engines.gas import BlastMeasurement, GasBlast, GasEngine, GasResult
 from blast_env.evaluation.places import other_places
 from blast_env.evaluation.questions.grid_error import convergence_index
 from blast_env.evaluation.questions.verdict import consequences_of
@@ -55,7 +55,7 @@ def page(report: Report) -> str:
 
 
 @pytest.fixture(scope="module")
-def measured() -> RecordedBlast:
+def measured() -> BlastMeasurement:
     return GasBlast(small_hut(), LAYOUT).recorded()
 
 
@@ -134,7 +134,7 @@ def test_structures_of_a_building_are_one() -> None:
     assert second[:2] == ("shed", "other")
 
 
-def test_loads_are_those_of_the_blast(study: Study, measured: RecordedBlast) -> None:
+def test_loads_are_those_of_the_blast(study: Study, measured: BlastMeasurement) -> None:
     result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")
     (row,) = result.structures.to_dict("records")
     coarse, fine = (study.effect(blasts, 0, "hut") for blasts in study.sizes)
@@ -157,7 +157,7 @@ def test_loads_are_those_of_the_blast(study: Study, measured: RecordedBlast) -> 
     assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
 
 
-def test_histories_are_the_momentum_of_the_walls(measured: RecordedBlast) -> None:
+def test_histories_are_the_momentum_of_the_walls(measured: BlastMeasurement) -> None:
     """Mean overpressure over time is the running impulse at the end.
 
     Histories have the middles of the steps, so half of the last step is beyond the last time.

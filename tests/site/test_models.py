@@ -128,6 +128,32 @@ def test_another_charge_replaces_the_threat_and_changes_the_hash() -> None:
         scenario.with_charge(Charge((28.0, 15.0), 50.0))
 
 
+@pytest.mark.parametrize("name", ["courtyard", "free_field", "perimeter_gate", "control_room"])
+def test_a_scenario_may_have_the_charges_that_it_draws_and_no_others(name: str) -> None:
+    scenario = load_scenario(name)
+    for seed in range(20):
+        charge = scenario.sample_charge(np.random.default_rng(seed))
+        assert isinstance(charge, Charge)
+        assert scenario.may_have(charge)
+        x_m, y_m = charge.position_m
+        others = (
+            charge._replace(position_m=(x_m + 200.0, y_m)),
+            charge._replace(position_m=(math.nan, y_m)),
+            charge._replace(tnt_kg=charge.tnt_kg + 1.0),
+            charge._replace(height_m=charge.height_m + 0.1),
+        )
+        assert not any(map(scenario.may_have, others))
+
+
+def test_a_line_of_charges_ends_at_its_ends() -> None:
+    source = SegmentSource(kind="segment", tnt_kg=1.0, start_m=(1.0, 2.0), end_m=(4.0, 6.0))
+    assert source.has_place((1.0, 2.0))
+    assert source.has_place((2.5, 4.0))
+    assert source.has_place((4.0, 6.0))
+    assert not source.has_place((4.003, 6.004))
+    assert not source.has_place((2.5, 4.001))
+
+
 def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
     scenario = load_scenario("courtyard")
     changed = scenario.with_simulation(overrides={"air": {"mass": 0.2}})

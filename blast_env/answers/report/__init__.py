@@ -25,7 +25,7 @@ from blast_env.evaluation.study import (
 from blast_env.files import scratch_folder
 from blast_env.geometry import Element
 from blast_env.layout import write_layout
-from blast_env.plots.report_figures import Drawn, ThreatPictures, site_plan
+from blast_env.plots.report_figures import Drawing, ThreatPictures, site_plan
 from blast_env.provenance import code_version, command, versions
 from blast_env.site import Scenario
 
@@ -57,7 +57,7 @@ class Report:
     """
 
     study: Study
-    pictures: Mapping[str, Sequence[Drawn]] = field(default_factory=dict)
+    pictures: Mapping[str, Sequence[Drawing]] = field(default_factory=dict)
 
 
 def run_report(

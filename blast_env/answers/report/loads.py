@@ -9,7 +9,7 @@ from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.study import Study, gas_of
 from blast_env.geometry import layout_text
-from blast_env.plots.report_figures import Drawn, worth_map
+from blast_env.plots.report_figures import Drawing, worth_map
 
 _NONE: Final = "\N{EN DASH}"
 _MOST_BAYS: Final = 40
@@ -19,7 +19,7 @@ _LOADS: Final = (
 )
 
 
-def loads_of(study: Study, pictures: Mapping[str, Sequence[Drawn]]) -> Section:
+def loads_of(study: Study, pictures: Mapping[str, Sequence[Drawing]]) -> Section:
     """Return the loads of every threat, the bays, and the pictures of the threats by their name."""
     words = gas_of(study.blasts).cell_words
     shown = (

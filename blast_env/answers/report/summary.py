@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from blast_env.answers.assess import response_table
-from blast_env.answers.document import AnyPart, Line, Number, Section, Table, percent
+from blast_env.answers.document import AnyPart, Kind, Line, Number, Section, Table, percent
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.capacity import mass_near
@@ -43,8 +43,8 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
             "the loads."
         )
     else:
-        kind = "passes" if behind.passes else "fails"
-        yield Line.of(f"{behind.word}: {behind.words}.", kind=kind)  # type: ignore[arg-type]
+        kind: Kind = "passes" if behind.passes else "fails"
+        yield Line.of(f"{behind.word}: {behind.words}.", kind=kind)
         yield Table.of("", ("", ""), _facts(study), 2)
     if study.stopped:
         missing = "The parts after it are missing."

@@ -10,7 +10,7 @@ from blast_env.answers.compare import headline, verdict_table
 from blast_env.answers.document import TYPOGRAPHIC, address_of
 from blast_env.answers.page import fill, text_table
 from blast_env.app.blasts import Picture
-from blast_env.app.session import Session, ShownLayout
+from blast_env.app.session import LayoutView, Session
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.blasts import NO_BARRIER, Blasts
 from blast_env.evaluation.questions.grid_error import GridError
@@ -38,7 +38,7 @@ class _Found:
         damage: Names of the buildings whose damage can be drawn, by the labels of these pictures.
     """
 
-    shown: ShownLayout
+    shown: LayoutView
     blasts: Blasts
     number: int
     pictures: Mapping[str, tuple[str, Picture]]
@@ -130,7 +130,7 @@ class ResultsView:
         self._show_notes(found)
 
     def _found(
-        self, shown: Sequence[ShownLayout], threat: LoadCase, results: Mapping[str, Blasts]
+        self, shown: Sequence[LayoutView], threat: LoadCase, results: Mapping[str, Blasts]
     ) -> Iterator[_Found]:
         """Yield every blast that is complete, with the addresses of its pictures."""
         session = self._session
@@ -183,7 +183,7 @@ class ResultsView:
                 background_tasks.create(self._draw(image, found.shown, threat, building))
 
     async def _draw(
-        self, image: ui.element, shown: ShownLayout, threat: LoadCase, building: str
+        self, image: ui.element, shown: LayoutView, threat: LoadCase, building: str
     ) -> None:
         png = await run.io_bound(self._session.damage_png, shown, threat, building)
         if png is not None and not image.is_deleted:

@@ -22,7 +22,7 @@ from blast_env.app.sources import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
-from blast_env.io.importing.convert import ImportedSite
+from blast_env.io.importing.convert import SiteImport
 from blast_env.io.importing.options import ImportOptions
 from blast_env.reading import Reading
 from blast_env.site import Scenario
@@ -236,7 +236,7 @@ class ImportDialog:
             self._dialog.close()
             self._report(found)
 
-    def _report(self, found: ImportedSite) -> None:
+    def _report(self, found: SiteImport) -> None:
         """Show the deviations of the site from the map before it is used."""
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full gap-1"):
             site = found.scenario.site

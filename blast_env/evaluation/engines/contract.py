@@ -98,7 +98,7 @@ class BlastDrawing(Protocol):
         """Return what makes the recorders that its pictures need, as for `GasBlast.run`."""
 
     def draw(self, found: Any) -> None:
-        """Draw a finished blast, a `blast_env.evaluation.engines.gas.RecordedBlast`."""
+        """Draw a finished blast, a `blast_env.evaluation.engines.gas.BlastMeasurement`."""
 
 
 class Engine(ABC):

@@ -251,7 +251,7 @@ class GasBlast(RunnableBlast):
         self,
         progress: Callable[[float], None] | None = None,
         drawing: BlastDrawing | None = None,
-    ) -> "RecordedBlast":
+    ) -> "BlastMeasurement":
         """Run the blast and return it with its complete record; `drawing` adds recorders."""
         # Here, because it imports Numba, which takes half a second.
         from blast_env.evaluation.engines.walls import WallHistories, record_of
@@ -263,11 +263,11 @@ class GasBlast(RunnableBlast):
             return (histories, *(() if more is None else more(grid)))
 
         result = self.run(progress, recorders)
-        return RecordedBlast(result, histories, record_of(result, histories))
+        return BlastMeasurement(result, histories, record_of(result, histories))
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedBlast:
+class BlastMeasurement:
     """A finished blast with its record.
 
     Attributes:

@@ -6,8 +6,8 @@ from blast_env.io.importing.ledger import FATES, MOST_LETTERS, Fate, Ledger, Led
 from blast_env.io.importing.options import ImportOptions
 
 if TYPE_CHECKING:
-    from blast_env.io.importing.convert import ImportedSite, import_site, read_map, sketch_of
-    from blast_env.io.importing.fitting import Deviation, FittedBuilding
+    from blast_env.io.importing.convert import SiteImport, import_site, read_map, sketch_of
+    from blast_env.io.importing.fitting import BuildingFit, Deviation
     from blast_env.io.importing.ground import cells_of, in_blocks
     from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
     from blast_env.io.importing.plane import LocalPlane, rotated, to_map
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 __all__ = [
     "FATES",
     "MOST_LETTERS",
+    "BuildingFit",
     "Deviation",
     "Fate",
-    "FittedBuilding",
     "ImportOptions",
-    "ImportedSite",
     "Ledger",
     "LedgerEntry",
     "LocalPlane",
     "Role",
+    "SiteImport",
     "cells_of",
     "dominant_direction_deg",
     "grid_offset_m",
@@ -36,8 +36,8 @@ __all__ = [
     "to_map",
 ]
 
-_CONVERT: Final = frozenset({"ImportedSite", "import_site", "read_map", "sketch_of"})
-_FITTING: Final = frozenset({"Deviation", "FittedBuilding"})
+_CONVERT: Final = frozenset({"SiteImport", "import_site", "read_map", "sketch_of"})
+_FITTING: Final = frozenset({"Deviation", "BuildingFit"})
 _GROUND: Final = frozenset({"cells_of", "in_blocks"})
 _OUTLINES: Final = frozenset({"dominant_direction_deg", "grid_offset_m"})
 _PLANE: Final = frozenset({"LocalPlane", "rotated", "to_map"})

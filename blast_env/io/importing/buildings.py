@@ -14,7 +14,7 @@ from blast_env.io.importing.doubles import without_doubles
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.outlines import areas_of, mended
-from blast_env.io.importing.placing import PlacedSite
+from blast_env.io.importing.placing import SitePlacement
 from blast_env.io.importing.things import Role, Thing
 from blast_env.io.importing.vertical import on_the_ground
 from blast_env.units import MODULE_SIDE_M
@@ -67,7 +67,7 @@ _GENERAL: Final = ("", "yes")
 _HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
 
 
-def prepared(site: PlacedSite) -> PlacedSite:
+def prepared(site: SitePlacement) -> SitePlacement:
     """Return a site whose buildings have sound outlines and heights, and do not overlap.
 
     Raises:
@@ -81,7 +81,7 @@ def prepared(site: PlacedSite) -> PlacedSite:
     return replace(site, things=(*others, *_apart(site, buildings)))
 
 
-def _sound(site: PlacedSite, thing: Thing) -> Thing:
+def _sound(site: SitePlacement, thing: Thing) -> Thing:
     """Return a building with its outline without self-intersections; a point becomes a circle.
 
     Raises:
@@ -105,7 +105,7 @@ def _sound(site: PlacedSite, thing: Thing) -> Thing:
     return replace(thing, geometry=mended(thing.geometry, what))
 
 
-def _with_parts(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
+def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     """Return buildings and their parts, joined by `part_of`.
 
     Parts that are small or without a height of their own are not kept; a building without a height
@@ -164,7 +164,7 @@ def _common(one: Thing, other: Thing) -> BaseGeometry:
     return shapely.intersection(one.geometry, other.geometry)
 
 
-def _apart(site: PlacedSite, things: Sequence[Thing]) -> list[Thing]:
+def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     """Return buildings without overlaps: the higher one has the ground of both.
 
     A part comes before its building. A higher building that begins above the lower one's base
@@ -222,7 +222,7 @@ def _filled(lower: Thing, higher: Thing, left: list[Thing], index: int) -> Itera
         left[index] = replace(left[index], geometry=areas_of(rest))
 
 
-def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:
+def _with_heights(site: SitePlacement, buildings: Sequence[Thing]) -> list[Thing]:
     """Return buildings, each with a height; the ledger gets the guesses.
 
     A height is guessed from the known ones of the nearest buildings of the kind, then from the
@@ -249,7 +249,7 @@ def _with_heights(site: PlacedSite, buildings: Sequence[Thing]) -> list[Thing]:
     return found
 
 
-def _check_height(site: PlacedSite, thing: Thing) -> None:
+def _check_height(site: SitePlacement, thing: Thing) -> None:
     """Enter a height that hardly any building of the kind has, and a bridge without an underside.
 
     More than ten storeys of a kind that has one or two as a rule, and more than 200 of others, are

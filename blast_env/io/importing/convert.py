@@ -16,7 +16,7 @@ from blast_env.files import read_regular
 from blast_env.geometry import Rectangle
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
-from blast_env.io.importing.fitting import MOST_TITLE, FittedBuilding, fit_buildings, plain_name
+from blast_env.io.importing.fitting import MOST_TITLE, BuildingFit, fit_buildings, plain_name
 from blast_env.io.importing.formats import way_of
 from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
@@ -24,7 +24,7 @@ from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Fate, Ledger
 from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
-from blast_env.io.importing.placing import OUTSIDE, PlacedSite, place_site
+from blast_env.io.importing.placing import OUTSIDE, SitePlacement, place_site
 from blast_env.io.importing.site_map import MOST_BYTES, SiteMap
 from blast_env.io.importing.things import Role, things_of
 from blast_env.provenance import package_version
@@ -53,7 +53,7 @@ _READ_HERE_BYTES: Final = 100_000
 
 
 @dataclass(frozen=True)
-class ImportedSite:
+class SiteImport:
     """A site imported from a map or drawing.
 
     Attributes:
@@ -63,8 +63,8 @@ class ImportedSite:
     """
 
     scenario: Scenario
-    buildings: tuple[FittedBuilding, ...]
-    site: PlacedSite
+    buildings: tuple[BuildingFit, ...]
+    site: SitePlacement
 
     @property
     def ledger(self) -> Ledger:
@@ -104,7 +104,7 @@ class ImportedSite:
         }
 
 
-def import_site(path: str | Path, options: ImportOptions | None = None) -> ImportedSite:
+def import_site(path: str | Path, options: ImportOptions | None = None) -> SiteImport:
     """Return the site of a map or drawing.
 
     The site is turned to the direction of most walls, its grid is aligned with most walls, and the
@@ -128,7 +128,7 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
     return read_apart(str(path), _imported, path, options)
 
 
-def _imported(path: Path, options: ImportOptions) -> ImportedSite:
+def _imported(path: Path, options: ImportOptions) -> SiteImport:
     site_map = read_map(path, options)
     site = prepared(place_site(site_map, things_of(site_map)))
     buildings = fit_buildings(site)
@@ -163,10 +163,10 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
         document["components"] = components
     if zone is not None:
         document["build_zone"] = zone
-    return ImportedSite(Scenario.from_document(document, str(path)), buildings, site)
+    return SiteImport(Scenario.from_document(document, str(path)), buildings, site)
 
 
-def _others(site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> dict[str, str]:
+def _others(site: SitePlacement, buildings: tuple[BuildingFit, ...]) -> dict[str, str]:
     """Return the roles of the outlines and texts that are used, by their places in the file."""
     options = site.options
     built = shapely.union_all([thing.outline for thing in buildings])
@@ -228,9 +228,7 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
     return site_map
 
 
-def _structures(
-    building: FittedBuilding, buildings: tuple[FittedBuilding, ...]
-) -> list[dict[str, Any]]:
+def _structures(building: BuildingFit, buildings: tuple[BuildingFit, ...]) -> list[dict[str, Any]]:
     """Return the structures of a building; with its parts they have a total weight of 1."""
     group = [polygon for polygon in buildings if polygon.group == building.group]
     walls = [(polygon, part.polygon.length) for polygon in group for part in polygon.polygons]
@@ -267,11 +265,11 @@ def _structures(
     return parts
 
 
-def _window_of(building: FittedBuilding) -> str:
+def _window_of(building: BuildingFit) -> str:
     return f"window_of_{building.name}"
 
 
-def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
+def _components(buildings: tuple[BuildingFit, ...]) -> dict[str, Any]:
     """Return the windows of a model, with panes of a common glass."""
     glass = catalogue()[_GLASS].model_dump(mode="json", exclude_none=True)
     return {
@@ -287,7 +285,7 @@ def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
     }
 
 
-def _description(site_map: SiteMap, site: PlacedSite, buildings: tuple[FittedBuilding, ...]) -> str:
+def _description(site_map: SiteMap, site: SitePlacement, buildings: tuple[BuildingFit, ...]) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
     digest = hashlib.sha256(site_map.content).hexdigest()[:_HASH_DIGITS]
     worst = max(buildings, key=lambda building: building.deviation.area_share)

@@ -14,7 +14,7 @@ from blast_env.geometry import Rectangle
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.outlines import areas_of, check_outlines, walls_of
 from blast_env.io.importing.panes import fitted
-from blast_env.io.importing.placing import PlacedSite
+from blast_env.io.importing.placing import SitePlacement
 from blast_env.io.importing.things import Role, Thing
 from blast_env.site.footprint import Footprint, footprint_of
 from blast_env.units import MODULE_SIDE_M
@@ -73,7 +73,7 @@ def _farthest_m(outline: BaseGeometry, other: BaseGeometry) -> float:
 
 
 @dataclass(frozen=True)
-class FittedBuilding:
+class BuildingFit:
     """A building as polygons.
 
     Attributes:
@@ -154,7 +154,7 @@ class FittedBuilding:
         return MODULE_SIDE_M**2 * sum(len(polygon.cells) for polygon in self.polygons)
 
 
-def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
+def fit_buildings(site: SitePlacement) -> tuple[BuildingFit, ...]:
     """Return the buildings of a site as polygons, with those protected that are to be.
 
     Raises:
@@ -183,8 +183,8 @@ def fit_buildings(site: PlacedSite) -> tuple[FittedBuilding, ...]:
 
 
 def _fitted(
-    site: PlacedSite, name: str, thing: Thing, polygons: tuple[Footprint, ...]
-) -> FittedBuilding:
+    site: SitePlacement, name: str, thing: Thing, polygons: tuple[Footprint, ...]
+) -> BuildingFit:
     """Return a building with its heights in whole modules.
 
     The ledger gets a building that modules cannot show well, such as thin walls.
@@ -202,7 +202,7 @@ def _fitted(
         base_m = max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
     walls_m = [wall.length_m for own in polygons for wall in own.walls]
     rise_m = 0.0 if height_m is None else height_m - base_m
-    return FittedBuilding(
+    return BuildingFit(
         name=name,
         title=shortened(thing.name, MOST_TITLE),
         place=thing.place,
@@ -219,7 +219,7 @@ def _fitted(
     )
 
 
-def _kept(site: PlacedSite) -> list[Thing]:
+def _kept(site: SitePlacement) -> list[Thing]:
     """Return the large enough buildings on the site, cut at its border.
 
     Raises:
@@ -246,14 +246,14 @@ def _kept(site: PlacedSite) -> list[Thing]:
     return [replace(item, name=item.name or _written_in(site, whole)) for item, whole in kept]
 
 
-def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
+def _too_many(site: SitePlacement, what: str) -> BlastEnvError:
     return BlastEnvError(
         f"{site.path}: {what} at most {MOST_STRUCTURES}, as many structures as a scenario has: "
         "make the site smaller (--size), or leave out small buildings (--least-area)"
     )
 
 
-def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
+def _written_in(site: SitePlacement, outline: BaseGeometry) -> str:
     """Return the text inside an outline of a drawing; an empty string unless it is unique."""
     texts = site.of_role(Role.NAME)
     shapely.prepare(outline)
@@ -339,7 +339,7 @@ def plain_name(title: str) -> str:
     return (f"b_{name}" if name[:1].isdigit() else name)[:_MOST_NAME].rstrip("_-")
 
 
-def _no_building(site: PlacedSite) -> BlastEnvError:
+def _no_building(site: SitePlacement) -> BlastEnvError:
     """Return the error of a site without buildings."""
     hint = ": the file has none; define them with --buildings-from"
     if site.layers:
@@ -351,8 +351,8 @@ def _no_building(site: PlacedSite) -> BlastEnvError:
 
 
 def _with_protected(
-    site: PlacedSite, buildings: Sequence[FittedBuilding]
-) -> tuple[FittedBuilding, ...]:
+    site: SitePlacement, buildings: Sequence[BuildingFit]
+) -> tuple[BuildingFit, ...]:
     """Return the buildings, with those protected that the user named, or else the file marks.
 
     All parts of a building are protected with it.
@@ -375,7 +375,7 @@ def _with_protected(
     return tuple(replace(building, protected=building.group in groups) for building in buildings)
 
 
-def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> int:
+def _named(site: SitePlacement, buildings: Sequence[BuildingFit], name: str) -> int:
     """Return the index of the building of a name, the scenario's or the map's."""
     asked = shortened(name, MOST_TITLE).casefold()
     for key in ("name", "title"):
@@ -391,7 +391,7 @@ def _named(site: PlacedSite, buildings: Sequence[FittedBuilding], name: str) -> 
 
 
 def _nearest(
-    site: PlacedSite, buildings: Sequence[FittedBuilding], place: tuple[float, float]
+    site: SitePlacement, buildings: Sequence[BuildingFit], place: tuple[float, float]
 ) -> int:
     """Return the index of the building nearest to a place of the map."""
     x_m, y_m = site.to_site(np.array([place]))[0]
@@ -417,7 +417,7 @@ def _nearest(
     return best
 
 
-def _listed(buildings: Sequence[FittedBuilding]) -> str:
+def _listed(buildings: Sequence[BuildingFit]) -> str:
     """Return the names of some buildings, those with names on the map first."""
     titled = sorted(buildings, key=lambda building: not building.title)
     shown = [

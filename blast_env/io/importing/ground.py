@@ -17,12 +17,12 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, fewest_runs
-from blast_env.io.importing.fitting import FittedBuilding
+from blast_env.io.importing.fitting import BuildingFit
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import PlaceXY
 from blast_env.io.importing.outlines import check_outlines, mended
 from blast_env.io.importing.passages import Mouths, mouths_of
-from blast_env.io.importing.placing import PlacedSite
+from blast_env.io.importing.placing import SitePlacement
 from blast_env.io.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
@@ -56,7 +56,7 @@ _OUTSIDE: Final = "outside the build zone of the map"
 
 
 def charge_sources(
-    site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
+    site: SitePlacement, buildings: Sequence[BuildingFit], radius_m: float
 ) -> tuple[list[dict[str, Any]], frozenset[str]]:
     """Return the places of charges, as the charges of a scenario, and their places in the file.
 
@@ -103,7 +103,7 @@ def charge_sources(
     return [*asked, *(source for _, source in sources)], used
 
 
-def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float) -> BaseGeometry:
+def _free(site: SitePlacement, buildings: Sequence[BuildingFit], radius_m: float) -> BaseGeometry:
     """Return the area of possible centres of a charge."""
     width_m, height_m = site.size_m
     gap_m = radius_m + _CLEAR_M
@@ -115,7 +115,7 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
 
 
 def _fewest(
-    site: PlacedSite, things: Sequence[Thing], free: BaseGeometry, mouths: Mouths, most: int
+    site: SitePlacement, things: Sequence[Thing], free: BaseGeometry, mouths: Mouths, most: int
 ) -> list[tuple[str, dict[str, Any]]]:
     """Return the sources of things with their places, in the finest form of at most `most`."""
     for tolerance_m in _SIMPLER_M:
@@ -146,7 +146,7 @@ def _ends_of(segment: dict[str, Any]) -> tuple[PlaceXY, PlaceXY]:
     return segment["start_m"], segment["end_m"]
 
 
-def _asked(site: PlacedSite, free: BaseGeometry) -> Iterator[dict[str, Any]]:
+def _asked(site: SitePlacement, free: BaseGeometry) -> Iterator[dict[str, Any]]:
     """Yield the points of `charge_at`."""
     for place in site.options.charge_at:
         x_m, y_m = site.to_site(np.array([place]))[0]
@@ -160,7 +160,7 @@ def _asked(site: PlacedSite, free: BaseGeometry) -> Iterator[dict[str, Any]]:
 
 
 def _sources(
-    site: PlacedSite, thing: Thing, free: BaseGeometry, tolerance_m: float
+    site: SitePlacement, thing: Thing, free: BaseGeometry, tolerance_m: float
 ) -> Iterator[dict[str, Any]]:
     """Yield the places of a charge as a scenario has them, without its mass."""
     for part in shapely.get_parts(thing.geometry):
@@ -186,7 +186,7 @@ def _segments(
         yield {"kind": "segment", "start_m": ends[0], "end_m": ends[1], "weight": weight}
 
 
-def _areas(site: PlacedSite, area: BaseGeometry, tolerance_m: float) -> Iterator[dict[str, Any]]:
+def _areas(site: SitePlacement, area: BaseGeometry, tolerance_m: float) -> Iterator[dict[str, Any]]:
     """Yield the blocks of an area; their side grows with the tolerance."""
     # Whole modules only, so that the blocks keep as clear as the area does.
     reach_m = 0.5 * MODULE_SIDE_M - _HAIR_M
@@ -203,7 +203,7 @@ def _point(x_m: float, y_m: float) -> dict[str, Any]:
     return {"kind": "point", "position_m": position_m, "weight": _POINT_SHARE_M}
 
 
-def build_zone(site: PlacedSite, buildings: Sequence[FittedBuilding]) -> dict[str, Any] | None:
+def build_zone(site: SitePlacement, buildings: Sequence[BuildingFit]) -> dict[str, Any] | None:
     """Return the build zone in the form of a scenario; `None` if neither map nor options have one.
 
     A zone that is not a rectangle becomes its bounding box, with no-build areas for the rest.
@@ -248,7 +248,7 @@ def build_zone(site: PlacedSite, buildings: Sequence[FittedBuilding]) -> dict[st
 
 
 def _keep_outs(
-    site: PlacedSite, inside: BoolArray, window: tuple[slice, slice]
+    site: SitePlacement, inside: BoolArray, window: tuple[slice, slice]
 ) -> list[dict[str, Any]]:
     """Return the no-build areas, in the finest blocks within the limit of a scenario."""
     reach_m = 0.5 * MODULE_SIDE_M - _TOUCHED_M
@@ -277,7 +277,7 @@ def _keep_outs(
     )
 
 
-def _on_site(site: PlacedSite, role: Role) -> list[Thing]:
+def _on_site(site: SitePlacement, role: Role) -> list[Thing]:
     """Return the objects of a role, areas with sound outlines that are cut at the border.
 
     Raises:
@@ -300,7 +300,7 @@ def _on_site(site: PlacedSite, role: Role) -> list[Thing]:
     return things
 
 
-def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, slice]:
+def _window(site: SitePlacement, area_m: Rectangle, option: str) -> tuple[slice, slice]:
     """Return the rows and columns of a rectangle, which must lie on the site.
 
     Raises:

@@ -8,10 +8,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.arrays import FloatArray
-from blast_env.io.importing.fitting import FittedBuilding
+from blast_env.io.importing.fitting import BuildingFit
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import PlaceXY
-from blast_env.io.importing.placing import PlacedSite
+from blast_env.io.importing.placing import SitePlacement
 from blast_env.io.importing.things import Role, Thing
 
 _SOLID: Final = "streets through buildings, which are solid on the site: charges at the mouths"
@@ -27,7 +27,7 @@ _MOST_AHEAD_M: Final = 3.0
 Mouths = dict[str, list[PlaceXY]]
 
 
-def mouths_of(site: PlacedSite, buildings: Sequence[FittedBuilding], free: BaseGeometry) -> Mouths:
+def mouths_of(site: SitePlacement, buildings: Sequence[BuildingFit], free: BaseGeometry) -> Mouths:
     """Return places of charges before the mouths of streets in buildings, by places in the file.
 
     The ledger gets the streets.

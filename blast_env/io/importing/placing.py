@@ -39,7 +39,7 @@ _TO_BORDER_M: Final = 1.0  # of charges
 
 
 @dataclass(frozen=True)
-class PlacedSite:
+class SitePlacement:
     """A site on a map, with its objects in metres from the site's lower left corner.
 
     Attributes:
@@ -106,7 +106,7 @@ class PlacedSite:
         return np.asarray(turned - np.array(self.corner_m))
 
 
-def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
+def place_site(site_map: SiteMap, things: Sequence[Thing]) -> SitePlacement:
     """Return the site that the options specify, or one around all objects of the map.
 
     Lines that close become outlines. The ledger gets the objects that are elsewhere or cannot be
@@ -137,7 +137,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
     layers = sorted(
         {str(feature.tags["layer"]) for feature in site_map.features if "layer" in feature.tags}
     )
-    site = PlacedSite(
+    site = SitePlacement(
         path=site_map.path,
         options=options,
         ledger=ledger,
@@ -152,7 +152,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> PlacedSite:
     return replace(site, faulty=tuple(_faults([*lines, *_moved(faulty, site.to_site)], site)))
 
 
-def _faults(faulty: Iterable[Thing], site: PlacedSite) -> Iterator[Thing]:
+def _faults(faulty: Iterable[Thing], site: SitePlacement) -> Iterator[Thing]:
     """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger."""
     is_whole_file = site.options.size_m is None
     for thing in faulty:

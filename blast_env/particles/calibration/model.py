@@ -280,10 +280,10 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
     """
     path = path_of(name_or_path)
     if path.suffix != SUFFIX:
-        name, known = str(name_or_path), stored_calibrations()
-        if name not in known:
-            raise UnknownNameError("calibration", name, known)
+        name = str(name_or_path)
         engines = calibrated_engines(name)
+        if not engines:
+            raise UnknownNameError("calibration", name, stored_calibrations())
         engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
         if engine not in engines:
             raise CalibrationError(

@@ -9,7 +9,7 @@ from ezdxf.entities.insert import Insert
 from ezdxf.filemanagement import new, readfile
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
 from tests.io.importing.maps import rectangle
 
@@ -18,22 +18,22 @@ IN_AIR = "undersides more than a storey above the ground"
 GROUND = "ground under buildings"
 
 
-def drawn(path: Path, **options: Any) -> ImportedSite:
+def drawn(path: Path, **options: Any) -> SiteImport:
     asked: dict[str, Any] = {"buildings_from": ("BLD",), "charge_at": ((-5.0, -5.0),)}
     return import_site(path, ImportOptions(**asked | {"protect_near": (10.0, 5.0)} | options))
 
 
-def case(name: str, **options: Any) -> ImportedSite:
+def case(name: str, **options: Any) -> SiteImport:
     return drawn(CASES / f"d_{name}.dxf", **options)
 
 
-def boxes(site: ImportedSite) -> list[tuple[float, float, float | None]]:
+def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
     """Return area, underside and height of the buildings, the largest first."""
     found = [(round(each.outline.area, 1), each.base_m, each.height_m) for each in site.buildings]
     return sorted(found, reverse=True)
 
 
-def kinds(site: ImportedSite, fate: Fate) -> list[str]:
+def kinds(site: SiteImport, fate: Fate) -> list[str]:
     return [each.kind for each in site.ledger.of(fate)]
 
 
@@ -48,7 +48,7 @@ class Drawing:
         attributes = {"layer": "BLD", "elevation": base, "thickness": rise}
         self.space.add_lwpolyline(rectangle(left, 0, width, 10), close=True, dxfattribs=attributes)
 
-    def imported(self, folder: Path, **options: Any) -> ImportedSite:
+    def imported(self, folder: Path, **options: Any) -> SiteImport:
         self.document.saveas(folder / "drawing.dxf")
         return drawn(folder / "drawing.dxf", **options)
 

@@ -17,7 +17,7 @@ from ezdxf.render.forms import cube
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
 from tests.io.importing.maps import rectangle
 
@@ -241,7 +241,7 @@ def towns(draw: Any) -> Town:
     return town
 
 
-def imported(town: Town, folder: Path) -> ImportedSite:
+def imported(town: Town, folder: Path) -> SiteImport:
     path = folder / "town.dxf"
     town.document.saveas(path)
     place = town.scaled(-6.0, 5.0)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import Fate, ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import Fate, ImportOptions, SiteImport, import_site
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 
@@ -68,7 +68,7 @@ class Model:
         link.RelatedElements, link.RelatingStructure = [element], self.storeys[storey]
         return element.GlobalId
 
-    def imported(self, folder: Path, **options: Any) -> ImportedSite:
+    def imported(self, folder: Path, **options: Any) -> SiteImport:
         path = folder / "house.ifc"
         self.file.write(str(path))
         return import_site(path, ImportOptions(**(CHARGE | options)))

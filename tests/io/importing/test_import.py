@@ -12,7 +12,7 @@ import shapely
 from pyproj import Transformer
 
 from blast_env.io.export import LayoutPlan, export_layout
-from blast_env.io.importing import Fate, ImportedSite, ImportOptions, Role, import_site
+from blast_env.io.importing import Fate, ImportOptions, Role, SiteImport, import_site
 from blast_env.layout import usable_cells
 from blast_env.sections import PointM
 from blast_env.site import (
@@ -34,11 +34,11 @@ TO_UTM = Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
 
 
 @pytest.fixture(scope="module")
-def block() -> ImportedSite:
+def block() -> SiteImport:
     return import_site(BLOCK, HALL)
 
 
-def imported(path: Path, **options: Any) -> ImportedSite:
+def imported(path: Path, **options: Any) -> SiteImport:
     return import_site(path, ImportOptions(**options))
 
 
@@ -63,7 +63,7 @@ def in_utm(feature: dict[str, Any]) -> Any:
 # The block.
 
 
-def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: ImportedSite) -> None:
+def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: SiteImport) -> None:
     assert block.site.rotation_deg == pytest.approx(23.0, abs=0.01)
     assert [each.title for each in block.buildings if each.protected] == ["Town Hall"]
     for each in block.buildings:
@@ -75,7 +75,7 @@ def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: Importe
     assert georeference.crs == "EPSG:4326"
 
 
-def test_heights_are_those_of_the_map_in_whole_modules(block: ImportedSite) -> None:
+def test_heights_are_those_of_the_map_in_whole_modules(block: SiteImport) -> None:
     heights = {each.title: each.height_m for each in block.buildings}
     assert heights == {
         "Town Hall": 10.5,
@@ -91,7 +91,7 @@ def test_heights_are_those_of_the_map_in_whole_modules(block: ImportedSite) -> N
     assert guess.detail.startswith("9.0 m as 7 neighbours, low ")
 
 
-def test_streets_are_places_of_charges_as_likely_on_every_metre(block: ImportedSite) -> None:
+def test_streets_are_places_of_charges_as_likely_on_every_metre(block: SiteImport) -> None:
     sources = block.scenario.charge
     assert len(sources) == 4  # two straight pieces, at both kerbs
     for source in sources:
@@ -100,7 +100,7 @@ def test_streets_are_places_of_charges_as_likely_on_every_metre(block: ImportedS
     assert sum(each.weight for each in sources) == pytest.approx(2.0 * 84.0, abs=2.0)
 
 
-def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: ImportedSite) -> None:
+def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: SiteImport) -> None:
     zone = block.scenario.zone
     assert (zone.rows, zone.columns) == (8, 64)  # 4 m x 32 m
     assert [each.reason for each in zone.keep_outs] == ["monument"]
@@ -111,7 +111,7 @@ def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: ImportedSite)
 
 @pytest.mark.parametrize("suffix", [".osm", ".osm.pbf", ".dxf"])
 def test_every_format_gives_the_same_buildings(
-    suffix: str, block: ImportedSite, tmp_path: Path
+    suffix: str, block: SiteImport, tmp_path: Path
 ) -> None:
     path = BLOCK.with_suffix(suffix)
     if suffix == ".osm.pbf":
@@ -134,7 +134,7 @@ def test_every_format_gives_the_same_buildings(
 # The way back.
 
 
-def test_layout_lands_on_the_map_where_it_belongs(block: ImportedSite, tmp_path: Path) -> None:
+def test_layout_lands_on_the_map_where_it_belongs(block: SiteImport, tmp_path: Path) -> None:
     """Buildings lie over those of the extract, a module on the piece of ground that it is for."""
     save_scenario(block.scenario, tmp_path / "block.toml")
     scenario = load_scenario(tmp_path / "block.toml")
@@ -165,7 +165,7 @@ def test_layout_lands_on_the_map_where_it_belongs(block: ImportedSite, tmp_path:
     assert shapely.covers(zone.buffer(0.3), square)
 
 
-def test_what_is_exported_can_be_imported_again(block: ImportedSite, tmp_path: Path) -> None:
+def test_what_is_exported_can_be_imported_again(block: SiteImport, tmp_path: Path) -> None:
     path = export_layout(LayoutPlan(block.scenario, ()), tmp_path / "block.geojson")
     again = import_site(path)
     mine, new = (comparable(each) for each in (block.scenario, again.scenario))

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
 
 pytest.importorskip("ifcopenshell")
@@ -14,24 +14,24 @@ pytest.importorskip("ifcopenshell")
 CASES = Path(__file__).parent / "cases"
 
 
-def case(name: str, **options: Any) -> ImportedSite:
+def case(name: str, **options: Any) -> SiteImport:
     asked = {"protect": ("Court",), "charge_at": ((-6.0, 3.0),)}
     return import_site(CASES / f"i_{name}.ifc", ImportOptions(**asked | options))
 
 
-def boxes(site: ImportedSite) -> list[tuple[float, float, float | None]]:
+def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
     """Return area, underside and height of the buildings, the largest first."""
     found = [(round(each.outline.area, 1), each.base_m, each.height_m) for each in site.buildings]
     return sorted(found, reverse=True)
 
 
-def pane_m(site: ImportedSite) -> tuple[float, float, float]:
+def pane_m(site: SiteImport) -> tuple[float, float, float]:
     (window,) = site.scenario.components.values()
     assert window.kind == "glazing"
     return window.width_m, window.height_m, window.sill_m
 
 
-def said(site: ImportedSite, fate: Fate, words: str) -> list[str]:
+def said(site: SiteImport, fate: Fate, words: str) -> list[str]:
     """Return the details of the lines of the ledger whose kind has these words."""
     return [each.detail for each in site.ledger.of(fate) if words in each.kind]
 

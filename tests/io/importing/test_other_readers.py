@@ -23,7 +23,7 @@ from pyproj import Geod, Transformer
 from shapely.affinity import rotate, scale, translate
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.bodies import LEAST_STOREY_M
 from tests.io.importing.models import LOT_M, MIDDLE, TURNS_DEG, UNITS, WALL_M, WAYS, Model
 
@@ -60,7 +60,7 @@ def placed(drawn: list[tuple[BaseGeometry, dict[str, str]]]) -> list[dict[str, A
     return found
 
 
-def imported(path: Path, place: tuple[float, float]) -> ImportedSite:
+def imported(path: Path, place: tuple[float, float]) -> SiteImport:
     return import_site(path, ImportOptions(protect_near=place, charge_at=(place,), margin_m=60.0))
 
 
@@ -70,7 +70,7 @@ def area_m2(shape: BaseGeometry) -> float:
     return abs(float(area))
 
 
-def check(site: ImportedSite, shapes: dict[str, tuple[BaseGeometry, dict[str, str]]]) -> None:
+def check(site: SiteImport, shapes: dict[str, tuple[BaseGeometry, dict[str, str]]]) -> None:
     assert {each.place for each in site.buildings} == shapes.keys()
     for each in site.buildings:
         shape, tags = shapes[each.place]
@@ -158,7 +158,7 @@ Solid = tuple[float, float, float]
 """Area, m2, underside and top above the ground, m."""
 
 
-def same(site: ImportedSite, expected: list[Solid]) -> None:
+def same(site: SiteImport, expected: list[Solid]) -> None:
     """Hold the buildings of a site against solids."""
     own = [(each.outline.area, each.base_m, each.height_m) for each in site.buildings]
     assert len(own) == len(expected)

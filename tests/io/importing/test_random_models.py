@@ -13,7 +13,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
 from tests.io.importing.models import LOT_M, TURNS_DEG, UNITS, WALL_M, WAYS, Model
 
@@ -166,7 +166,7 @@ def models(draw: Any) -> Model:
     return found
 
 
-def imported(model: Model, folder: Path) -> ImportedSite:
+def imported(model: Model, folder: Path) -> SiteImport:
     options = ImportOptions(charge_at=(model.charge_at,), protect=("Town Hall",))
     return import_site(model.write(folder), options)
 

@@ -24,10 +24,10 @@ from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing import (
     FATES,
     Fate,
-    ImportedSite,
     ImportOptions,
     Ledger,
     LedgerEntry,
+    SiteImport,
     import_site,
     read_map,
 )
@@ -50,7 +50,7 @@ PLACE = charge(-5.0, 2.0)
 HOUSE = outline(rectangle(0, 0, 6, 4), name="House", height=6.0, protected=True)
 
 
-def entries(site: ImportedSite, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
+def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
     return tuple(each for each in site.ledger.of(fate) if words in each.kind)
 
 
@@ -64,7 +64,7 @@ def error_of(path: Path, **options: Any) -> str:
     return str(caught.value)
 
 
-def imported(path: Path, **options: Any) -> ImportedSite:
+def imported(path: Path, **options: Any) -> SiteImport:
     return import_site(path, ImportOptions(**options))
 
 
@@ -282,7 +282,7 @@ def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
     assert other.height_m == 2.0
 
 
-def kerbs_m(site: ImportedSite) -> list[float]:
+def kerbs_m(site: SiteImport) -> list[float]:
     sources = (each for each in site.scenario.charge if not isinstance(each, RectangleSource))
     return [each.lines_m[0][0][1] for each in sources]
 

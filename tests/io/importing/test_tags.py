@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import Fate, ImportedSite, ImportOptions, LedgerEntry, import_site
+from blast_env.io.importing import Fate, ImportOptions, LedgerEntry, SiteImport, import_site
 from blast_env.site import PointSource, Scenario, SegmentSource
 from tests.io.importing.maps import (
     DEGREE_M,
@@ -27,24 +27,24 @@ HOUSE = outline(rectangle(0, 0, 20, 10), name="House", height=6.0, protected=Tru
 FOOT_M = 0.3048
 
 
-def case(name: str, **options: Any) -> ImportedSite:
+def case(name: str, **options: Any) -> SiteImport:
     return import_site(CASES / name, ImportOptions(**{"protect": ("Court",)} | options))
 
 
-def entries(site: ImportedSite, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
+def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
     return tuple(each for each in site.ledger.of(fate) if words in each.kind)
 
 
-def places(site: ImportedSite, fate: Fate, words: str) -> list[str]:
+def places(site: SiteImport, fate: Fate, words: str) -> list[str]:
     return [each.place for each in entries(site, fate, words)]
 
 
-def heights(site: ImportedSite) -> dict[str, tuple[float, float | None]]:
+def heights(site: SiteImport) -> dict[str, tuple[float, float | None]]:
     """Return underside and top of each building by its place in the file, m."""
     return {each.place: (each.base_m, each.height_m) for each in site.buildings}
 
 
-def of_map(folder: Path, *features: dict[str, Any], **options: Any) -> ImportedSite:
+def of_map(folder: Path, *features: dict[str, Any], **options: Any) -> SiteImport:
     """Import features beside a house, `features[0]`, and a place of a charge, `features[1]`."""
     return import_site(written(folder, HOUSE, PLACE, *features), ImportOptions(**options))
 
@@ -431,7 +431,7 @@ def test_of_a_way_and_a_relation_the_one_with_the_courtyard_stands() -> None:
     assert places(site, Fate.MERGED, "drawn twice") == ["features[1]"]
 
 
-def court(folder: Path, relation: dict[str, str], **way: str) -> ImportedSite:
+def court(folder: Path, relation: dict[str, str], **way: str) -> SiteImport:
     """Import a house, and a court of 20 m x 20 m with a yard of 10 m x 10 m as a relation."""
     extract = town()
     extract.way(10, rectangle(30, 0, 20, 20), **way)
@@ -564,7 +564,7 @@ def test_objects_that_are_not_visible_are_not_there(tmp_path: Path) -> None:
 # Streets through buildings.
 
 
-def mouths_m(site: ImportedSite) -> list[shapely.Point]:
+def mouths_m(site: SiteImport) -> list[shapely.Point]:
     """Return the ends of all places of charges."""
     found = [shapely.Point(end) for each in segments(site.scenario) for end in each.lines_m[0]]
     found += [

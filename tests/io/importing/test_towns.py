@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import pytest
 from hypothesis import given, settings
 
-from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
 from tests.io.importing.maps import DEGREE_M
 from tests.io.importing.towns import (
@@ -26,7 +26,7 @@ _ROUNDING = 0.01
 """Degrees of latitude are shorter than those on the equator by half a per cent."""
 
 
-def check(site: ImportedSite, items: Mapping[str, tuple[Item, bool]]) -> None:
+def check(site: SiteImport, items: Mapping[str, tuple[Item, bool]]) -> None:
     """Hold the fates of all objects and the buildings against those known.
 
     What is outside the site is not of it, or merged before that is known.
