@@ -186,7 +186,9 @@ class GasRun:
         with _notice():
             expand(solver, charge, self.remap_radius_m)
             doubled_s = [charge.profile(run_m).time_s for run_m in settings.doubled_m]
-        return CoarseningSolver(solver, doubled_s) if doubled_s else solver
+        if doubled_s and isinstance(solver, GasSolver):  # adaptive cells are never doubled
+            return CoarseningSolver(solver, doubled_s)
+        return solver
 
     def record(self, recorder: Recorder) -> None:
         """Add a recorder before the first step.

@@ -237,6 +237,7 @@ class Networks:
         members, points, _ = heard.shape
         both = np.empty((members, points, FEATURES + MESSAGE), dtype=np.float32)
         both[..., :FEATURES], both[..., FEATURES:] = scaled, heard
+        # Two hidden layers, then a linear one to a single number per point.
         second = two_layers(
             both, layers.first, layers.first_bias, layers.second, layers.second_bias
         )
@@ -250,6 +251,8 @@ class Networks:
             scaled: As for a call; open shares are those on the empty site.
             heard: Sum of the messages of the structures (members, points, MESSAGE).
         """
+        # The first layer is linear before its bend, so that the sums over inputs that no layout
+        # changes are made once: W [c, s, m] = W_c c + W_s s + W_m m.
         layers, constant = self._layers, FEATURES - SHARES
         both = np.empty((*heard.shape[:2], constant + MESSAGE), dtype=np.float32)
         both[..., :constant], both[..., constant:] = scaled[:, :constant], heard
@@ -303,9 +306,12 @@ class Surrogate:
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
+        # 1. Layouts by their charge, whose paths and relations they share.
         of_charges: dict[Charge, list[int]] = {}
         for number, charge in enumerate(charges):
             of_charges.setdefault(charge, []).append(number)
+        # 2. What structures and pieces say to each point: sums of messages (Gilmer et al. 2017,
+        # Neural message passing for quantum chemistry), as the order of solids has no meaning.
         groups = [
             (site.approach(charge), [site.boxes(layouts[number]) for number in numbers])
             for charge, numbers in of_charges.items()
@@ -318,11 +324,15 @@ class Surrogate:
 
         def of(which: int, known: Callable[[Approach], FloatArray]) -> list[FloatArray]:
             power = self._of_loads[which][1]
+            # 3. ln load = ln of Kingery and Bulmash's + what the networks add, at each point.
             differs = [item.differs(own, which) for _, item, own in met]
             logs = [np.tile(known(item), len(own)) for item, _, own in met]
+            # 4. The mean over the points of each structure, by each network.
             loads = log_loads(
                 np.concatenate(differs, axis=1), np.concatenate(logs), area_m2, starts, power
             )
+            # 5. The prediction and its spread over the networks, which were fitted from different
+            # beginnings (deep ensembles, Lakshminarayanan et al. 2017).
             both = _mean_and_spread(loads)
             return [estimate.reshape(len(layouts), -1)[place] for estimate in both]
 
@@ -466,6 +476,7 @@ def log_loads(
         starts: Index of the first point of each structure (structures,).
         power: Exponent of the mean.
     """
+    # L = (sum of A L_i^p / sum of A)^(1 / p): p = 1 is the mean, a large p nearly the largest.
     area_of_all_m2 = np.add.reduceat(area_m2, starts)
     loads = area_m2 * np.exp(power * (known + differs))
     logs: FloatArray = np.log(np.add.reduceat(loads, starts, axis=1) / area_of_all_m2) / power

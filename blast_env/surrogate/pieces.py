@@ -128,6 +128,8 @@ class PieceKnowledge:
 
     def _meet(self, boxes: Sequence[Box]) -> None:
         """Compute pieces."""
+        # The blocked paths and the messages of a piece depend on no other piece: each is computed
+        # once, and layouts are put together from them.
         first = len(self._numbers) + 1
         pieces = np.array(boxes)
         stopped, is_open = self._ways.stopped_by_each(pieces)
@@ -167,12 +169,14 @@ def _put_shares(
         straight = is_open[0, point]
         for by in range(places):
             below[by] = stopped[0, point, by]
+        # 1. Several pieces stop as many detours by a place as the one that stops most.
         for piece in own:
             if piece == 0:
                 break
             straight = straight and is_open[piece, point]
             for by in range(places):
                 below[by] = max(below[by], stopped[piece, point, by])
+        # 2. The shares that are left, and 3. their scaled and bounded values.
         shares[:] = 0.0
         shares[-1] = 1.0 if straight else 0.0
         for station in range(len(STATIONS)):
@@ -229,6 +233,7 @@ def _put_differs(
                             break
                         for index in range(length):
                             given[number, SHARES + index] += messages[piece, member, row, index]
+                # Four points at once, from memory read once; the last ones repeat at the end.
                 at_1, at_2 = min(point + 1, points - 1), min(point + 2, points - 1)
                 at_3 = min(point + 3, points - 1)
                 rows = point * width, at_1 * width, at_2 * width, at_3 * width

@@ -74,6 +74,7 @@ class Ways:
             solids: Left, bottom, right, top, height of each structure, m (solids, 5).
         """
         points_m = np.ascontiguousarray(points_m)  # one kind of arrays is compiled once
+        # 1. Places beside and above the straight path, at some stations of it.
         towards = points_m - start_m
         flat_m = np.hypot(towards[:, 0], towards[:, 1])
         across = np.stack((-towards[:, 1], towards[:, 0]), axis=1) / flat_m[:, np.newaxis]
@@ -83,8 +84,11 @@ class Ways:
             asides[:, np.newaxis] * across[:, np.newaxis, np.newaxis]
         )
         by_height_m = np.ascontiguousarray(straight_m[..., 2])
+        # 2. The weight of each detour falls with its extra length, in units that grow with the
+        # charge (Hopkinson and Cranz).
         falls_m = np.array(FALLS_M) * np.cbrt(tnt_kg / _REFERENCE_KG)
         weights = _weights_left(start_m, points_m, by_m, by_height_m, falls_m)
+        # 3. The detours that the structures stop, from the lowest up.
         stopped = np.zeros(by_m.shape[:3], dtype=np.int64)
         is_straight_open = np.ones(len(points_m), dtype=bool)
         ways = cls(start_m, points_m, by_m, by_height_m, stopped, is_straight_open, weights)
@@ -166,6 +170,8 @@ def _weights_left(
         straight_m = sqrt(_flat_m2(start_m, end_m) + (end_m[2] - start_m[2]) ** 2)
         for station in range(stations):
             of_all[:] = 0.0
+            # exp(-extra length / fall), summed from the highest detour down: entry k is what is
+            # left if the k lowest are stopped.
             for aside in range(asides):
                 corner_m = by_m[point, station, aside]
                 to_m2, from_m2 = _flat_m2(start_m, corner_m), _flat_m2(end_m, corner_m)
@@ -179,6 +185,7 @@ def _weights_left(
                         ] + exp((straight_m - to_m - from_m) / falls_m[fall])
                 for fall in range(falls):
                     of_all[fall] += left[point, station, aside, 0, fall]
+            # As shares of all detours of the station.
             for aside in range(asides):
                 for above in range(aboves):
                     for fall in range(falls):
@@ -254,15 +261,19 @@ def _stop(
     met = np.empty((2 * len(solids), 3))
     first = 0
     while first < points:
+        # 1. Points one above the other have the same paths in plan, which are cut once for all.
         last = first + 1
         while last < points and _flat_m2(points_m[first], points_m[last]) == 0.0:
             last += 1
         end_m = points_m[first]
+        # 2. The straight path of each of them.
         straight = met[: _intersect(start_m, end_m, solids, met)]
         for point in range(first, last):
             if is_straight_open[point] and _is_stopped(start_m[2], points_m[point, 2], straight):
                 is_straight_open[point] = False
                 is_behind[point] = True
+        # 3. The detours: to a place beside the path, then on to the point. A higher one clears
+        # whatever a lower one does, so that the count of stopped ones only grows.
         for station in range(stations):
             for aside in range(asides):
                 corner_m = by_m[first, station, aside]
@@ -294,6 +305,7 @@ def _intersect(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: 
     """
     count = 0
     for solid in range(len(solids)):
+        # The part of the line within both slabs of the box (Kay and Kajiya 1986).
         enter, leave = 0.0, 1.0
         for axis in range(2):
             way = end_m[axis] - start_m[axis]

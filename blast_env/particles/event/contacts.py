@@ -71,6 +71,7 @@ def _stay_together(one: Record, other: Record) -> None:
 @njit(error_model="numpy")
 def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> None:
     """Collide two balls: restitution, friction, base impulse and shrinking."""
+    # 1. Restitution: of this pair of kinds, and 1 within one contact (`follows_at_once`).
     explosive = one.explosive + other.explosive
     restitution = rules.restitution[explosive]
     one_at_once = follows_at_once(one, time_s, rules)
@@ -78,6 +79,7 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     is_caught = at_once and max(one.presses, other.presses) > _PRESSED and restitution < 1.0
     if at_once:
         restitution = 1.0
+    # 2. The normal, from one centre to the other.
     move_to(one, time_s)
     move_to(other, time_s)
     nx, ny = other.x - one.x, other.y - one.y
@@ -86,6 +88,8 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
         nx, ny = nx / distance, ny / distance
     else:
         nx, ny = 1.0, 0.0
+    # 3. J = -(1 + e) m1 m2 / (m1 + m2) v_n, with v_n the relative speed along the normal; then
+    # friction across it, and the model's base impulse.
     vx, vy = other.vx - one.vx, other.vy - one.vy
     reduced_mass = one.mass * other.mass / (one.mass + other.mass)
     normal = -(1.0 + restitution) * reduced_mass * (vx * nx + vy * ny)
@@ -93,6 +97,7 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     if rules.friction[explosive] > 0.0:
         along = _friction(one, other, vy * nx - vx * ny, rules, rules.friction[explosive] * normal)
     normal += rules.base_impulse
+    # 4. Equal and opposite on both, so that momentum holds.
     px, py = normal * nx - along * ny, normal * ny + along * nx
     one.vx -= px / one.mass
     one.vy -= py / one.mass
@@ -101,6 +106,7 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     one.collisions += 1
     other.collisions += 1
     one.rattles = other.rattles = 0
+    # 5. Balls that are pressed together stick; 6. an explosive ball shrinks on air.
     if is_caught:
         _stay_together(one, other)
     if at_once:
@@ -116,6 +122,8 @@ def _friction(one: Record, other: Record, slip: float, rules: Record, most: floa
 
     The impulse stops the slip of the surfaces within the limit of Coulomb's law.
     """
+    # With k = I / (m r^2), a tangential impulse P changes the slip by
+    # P (1 / m1 + 1 / (k1 m1) + 1 / m2 + 1 / (k2 m2)); Coulomb: |P| <= mu J.
     slip -= one.spin * one.radius + other.spin * other.radius
     inertia = rules.inertia_factor[one.explosive] * one.mass
     inertia_other = rules.inertia_factor[other.explosive] * other.mass
@@ -177,10 +185,13 @@ def collide_with_module(
     Returns:
         The module.
     """
+    # 1. Restitution, and whether this is a new contact: only that has a tangential part and
+    # shrinks the ball.
     restitution = _module_restitution(ball, time_s, rules)
     is_new = time_s - ball.module_s >= rules.contact_time_s
     move_to(ball, time_s)
     module = touched_module(ball, surface, modules)
+    # 2. The momentum that the module takes, (1 + e) m v_n: it does not move.
     nx, ny = contact_normal(ball, surface)
     along = ball.vy * nx - ball.vx * ny
     transferred = -(1.0 + restitution) * ball.mass * (ball.vx * nx + ball.vy * ny)
@@ -188,16 +199,20 @@ def collide_with_module(
     counted = transferred / ((1.0 + rules.module_restitution) * ball.mass)
     counted_along = along if is_new else 0.0
     speed = sqrt(counted * counted + counted_along * counted_along)
+    # 3. The paper's impulse m |v| before the collision, in multiples of a quantum, so that sums do
+    # not depend on their order.
     impulse = np.rint(ball.mass * speed / rules.quantum) * rules.quantum
     row[0], row[2], row[3] = time_s, module, ball.mass
     row[4], row[5] = -counted * nx - counted_along * ny, -counted * ny + counted_along * nx
     row[6], row[7], row[8], row[9] = nx, ny, impulse, transferred
+    # 4. The load of the module.
     load = loads[module]
     row[10], row[11] = ball.collisions, load.hits == 0
     load.first_hit_s = min(load.first_hit_s, time_s)
     load.hits += 1
     load.impulse += impulse
     load.transferred += transferred
+    # 5. The rebound, with friction; 6. a caught ball stops.
     push = _module_friction(ball, transferred, along, rules)
     ball.vx += (transferred * nx - push * ny) / ball.mass
     ball.vy += (transferred * ny + push * nx) / ball.mass

@@ -21,6 +21,7 @@ _MOST_BALLS: Final = 2**31
 @njit(error_model="numpy", inline="always")
 def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) -> None:
     """Insert a ball into the heap, or change its time."""
+    # A binary heap in an array: the children of k are 2 k and 2 k + 1, entry 0 has the size.
     place = heap[ball].place
     if place == 0:
         heap[0].ball += 1
@@ -117,6 +118,7 @@ at all, and they could collide without end.
 @njit(error_model="numpy", inline="always")
 def balls_touch_s(one: Record, other: Record, rules: Record) -> float:
     """Return the time at which two balls touch; inf if never."""
+    # Balls are moved only when something happens to them: both to the later of their times.
     start = max(one.since_s, other.since_s)
     before, before_other = start - one.since_s, start - other.since_s
     x = (other.x + other.vx * before_other) - (one.x + one.vx * before)
@@ -139,6 +141,8 @@ def surface_touch_s(ball: Record, surface: Record, rules: Record) -> float:
         along, speed_along = ball.x, ball.vx
     if approach <= 0.0 or distance <= 0.0:
         return inf
+    # The face at `surface.b` with the outward normal `surface.a`: the gap closes at the speed of
+    # approach, and the ball must then be beside the face, not beyond its ends.
     gap = distance - ball.radius
     if gap <= 0.0:
         if approach < max(_GRAZING * (approach + abs(speed_along)), rules.rest_speed):
@@ -238,6 +242,9 @@ def look_ahead(
     ball: int,
 ) -> None:
     """Find a ball's next event among all objects within reach, and schedule it."""
+    # 1. The border; 2. faces and corners of walls; 3. balls in the cell and its eight neighbours,
+    # which hold all that it can touch before it changes cells; 4. that change. The earliest of them
+    # is the ball's event (Alder and Wainwright 1959; one event per ball as Lubachevsky 1991).
     balls[ball].contact_s = border_touch_s(balls[ball], rules)
     balls[ball].partner = BORDER if balls[ball].contact_s < inf else NOBODY
     cell = balls[ball].cell
@@ -260,6 +267,7 @@ def cross(
     ball: int,
 ) -> None:
     """Move a ball to the next cell, and check the objects new in its neighbourhood."""
+    # Only the three cells ahead are new; the others were looked at before.
     step = balls[ball].crossing
     leave_cell(balls, cells, ball)
     cell = balls[ball].cell + step
