@@ -256,6 +256,8 @@ class Drive:
         return np.concatenate([self.reach.places_m, *self._beyond_m()])
 
     def _beyond_m(self) -> Iterator[FloatArray]:
+        # A piece that stops a vehicle still lets its load through by the penetration of its rating:
+        # the charge may go off there, across from each side that the vehicle reaches.
         radius_m = self.ground.charge_radius_m
         standing = [piece.rectangle for piece in (*self.held, *self.broken)]
         standing += self.ground.standing_m

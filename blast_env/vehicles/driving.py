@@ -93,6 +93,7 @@ class SpeedField:
         def label(speed_km_h: float) -> float:
             return _run_up_m(motion, speed_km_h) / STEP_M
 
+        # 1. Speeds as run-ups from standstill, v^2 = 2 a s: a step adds its length, a limit caps.
         top = label(motion.max_speed_km_h)
         most = np.full(is_open.shape, top, dtype=np.float32)
         for area in motion.slow:
@@ -101,6 +102,7 @@ class SpeedField:
         # Restrict the search to the bounding box of the open places, to save time.
         box = _around(is_open)
         ground, most = np.ascontiguousarray(is_open[box]), np.ascontiguousarray(most[box])
+        # 2. The states at the entries: all directions that lead into the site.
         labels = np.full((len(DIRECTIONS), *ground.shape), NEVER)
         entered = np.zeros_like(is_open)
         for start, inwards in starts:
@@ -111,6 +113,8 @@ class SpeedField:
                     labels[number][at] = np.minimum(
                         label(motion.entry_km_h) + LENGTHS[number], most[at]
                     )
+        # 3. From there along straight steps, arcs and turns on the spot. In a turn of radius r the
+        # tyres hold v^2 / r <= grip g, which is a run-up of grip g r / (2 a).
         per_radius = _per_radius(motion)
         arcs = arcs_up_to(top / per_radius, arc_step)
         spread(

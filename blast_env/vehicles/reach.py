@@ -102,6 +102,7 @@ class Reach:
             columns: Points to the right, from the left border.
             step_m: Spacing of the points.
         """
+        # Each part is a rectangle of points: differences at its corners, then two cumulative sums.
         row, column = np.nonzero(self.reached)
         count = np.zeros((rows + 1, columns + 1), dtype=np.int64)
         ends = []
@@ -207,16 +208,20 @@ class ReachQuery:
             reached_parts,
         )
 
+        # 1. Obstacles grow by half of the vehicle, which becomes a point (configuration space,
+        # Lozano-Perez 1983); entries shrink. In whole micrometres, touching is exact.
         half = steps_of(self.width_m) // 2
         closed, solid = _grown(self.closed_m, half), _grown(self.solid_m, half)
         starts = _grown(self.entries_m, -half)
         boxes = np.concatenate((closed, solid, starts))
         # The places nearest to a structure touch it, or are level with its corners.
         level = _grown(self.level_m, 0)
+        # 2. The edges of all boxes cut the plane into parts that are open or closed as a whole.
         ends = steps_of(self.site.width_m), steps_of(self.site.height_m)
         (x, lattice_x), (y, lattice_y) = (
             plane_of(boxes, level, half, end, _step(end), axis) for axis, end in enumerate(ends)
         )
+        # 3. The parts that are connected with an entry.
         start, reached, clear = reached_parts(x, y, closed, solid, starts)
         return Reach(
             width_m=self.width_m,

@@ -183,6 +183,9 @@ def advise(
     tried: list[LayoutTrial] = []
     moves = Moves(scenario)
 
+    # A local search with restarts among the best: (1) nothing, what other kinds found, and the
+    # rules' layouts, whole and by half; (2) for ever, a neighbour of one of the best so far. Each
+    # barrier costs its blasts once; hardening it in all ways costs none.
     def drawn() -> Iterator[Layout]:
         yield ()
         for layout in begin_with:
@@ -205,7 +208,7 @@ def advise(
         for barrier in drawn():
             tries += 1
             key = tuple(sorted(legal_part(scenario, barrier).layout))
-            if tries > 20 * budget:
+            if tries > 20 * budget:  # small sites have fewer layouts than the budget pays for
                 break
             if key in best:
                 continue
@@ -256,6 +259,7 @@ def advise_until(
         every.append(found)
         if not found.passes or judge(found.layout) is Verdict.PASSES:
             break
+        # What passed on these cells failed with finer ones: ask for less damage than it had.
         below = found.best.damage - margin
         begin_with = (*begin_with, found.layout)
     return replace(
@@ -315,6 +319,7 @@ def _hardened(
             if left is None or cost <= left:
                 layout = (*barrier, *map(Measure.named, taken))
                 worth, damage = problem.load(layout), _worst_damage(problem, layout)
+                # It reaches the target, but without the margin: worse than any that has it.
                 if worth <= 1.0 and damage >= damage_below:
                     worth = 1.0 + damage - damage_below + _TOO_LITTLE
                 found.append(LayoutTrial(worth, placement.cost + cost, damage, layout))

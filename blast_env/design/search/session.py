@@ -168,6 +168,7 @@ class SearchSession:
             SearchEndedError: If too few blasts are left for all of them, after the affordable ones
                 were assessed, or if too many assessments in a row needed no new blast.
         """
+        # (1) Equal layouts once; (2) as many as the blasts pay for; (3) their new blasts alone.
         count = self.plan.threats if threats is None else threats
         # Sorted: layouts that differ in the order of pieces are one and the same.
         keys = [tuple(sorted(layout)) for layout in layouts]
@@ -183,8 +184,9 @@ class SearchSession:
 
         This identifies layouts that were lucky under the first threats.
         """
-        # Successive halving: each round doubles the threats for the layouts that the blasts pay
-        # for, in equal shares of the reserve per round, and drops the rest.
+        # Successive halving (Jamieson and Talwalkar 2016): each round doubles the threats for the
+        # layouts that the blasts pay for, in equal shares of the reserve per round, and drops the
+        # rest.
         count, most = self.plan.threats, len(self.problem.threats)
         candidates = self.ranked(count)
         while count < most:
@@ -306,6 +308,7 @@ class SearchSession:
 
     def _consider(self, key: Layout) -> None:
         """Record a layout as the best one if it ranks before the present best."""
+        # More threats rank first: a load under few of them may be luck.
         threats = len(self._known[key])
         candidate = self._candidate(key, threats)
         best = self.best

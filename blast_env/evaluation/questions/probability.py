@@ -80,6 +80,8 @@ def scaled_to(judged: Consequences, charge: Charge) -> Consequences:
 
 def _scaled(response: BuildingResponse, charge: Charge) -> BuildingResponse:
     assert response.site is not None
+    # 1. The distance of each bay from the new place; 2. its history, stretched in pressure and time
+    # by the ratio of the curves; 3. the response to that.
     facade, old = response.on_cells, response.site.charge
     site = replace(response.site, charge=charge)
     other_m = bay_places(site, [bay.bay for bay in facade.bays]).distance_m
@@ -216,6 +218,8 @@ def level_probability(
     """
     if not judged.responses:
         raise BlastEnvError("no building has a facade: there is no level of protection")
+    # 1. Quantiles of all uncertain quantities; 2. in each draw the lowest level of any deciding bay:
+    # the level of a building is that of its worst bay.
     quantiles = _latin(draws, seed)
     levels = np.full(draws, int(LevelOfProtection.HIGH))
     for own in _deciding(judged.responses, deciding):

@@ -38,6 +38,7 @@ def without_doubles(buildings: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         one, other = usable[first], usable[second]
         if first >= second or {one, other} & gone or not _may_be_one(found[one], found[other]):
             continue
+        # The one with more parts, or with courtyards, says more and stays.
         ranks = [_rank(found[k].geometry) for k in (one, other)]
         kept, double = (other, one) if ranks[1] > ranks[0] else (one, other)
         if not _has_border(found[kept].geometry, found[double].geometry):

@@ -164,6 +164,7 @@ def fit_buildings(site: SitePlacement) -> tuple[BuildingFit, ...]:
     kept = _kept(site)
     if not kept:
         raise _no_building(site)
+    # The largest building first: it keeps its outline, and its neighbours fit to that.
     kept.sort(key=lambda thing: (thing.carries, -thing.geometry.area))
     fitted = []
     for thing, own in zip(kept, _polygons(kept), strict=True):
@@ -196,6 +197,7 @@ def _fitted(
         kind = "shapes of buildings that modules miss by much"
         site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name or name, detail)
     height_m = None
+    # Heights in whole modules, at least one of them.
     base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
     if thing.height_m is not None:
         height_m = max(round(thing.height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
@@ -267,6 +269,7 @@ def _polygons(kept: Sequence[Thing]) -> list[tuple[Footprint, ...]]:
 
     Buildings and terraces are separate: a building on a terrace takes no ground from it.
     """
+    # 1. Outlines apart: each without the ground of the larger ones before it.
     apart: list[BaseGeometry] = []
     for number, thing in enumerate(kept):
         others = [
@@ -275,6 +278,7 @@ def _polygons(kept: Sequence[Thing]) -> list[tuple[Footprint, ...]]:
             if other.carries == thing.carries and before.distance(thing.geometry) <= _JOINED_M
         ]
         apart.append(_beside(thing.geometry, shapely.union_all(others)))
+    # 2. Short coordinates, with more digits only if rounding makes modules overlap.
     polygons: list[tuple[Footprint, ...]] = []
     for digits in _DIGITS:
         polygons = [_footprints(part, digits) for part in apart]
@@ -291,6 +295,7 @@ def _beside(outline: BaseGeometry, others: BaseGeometry) -> BaseGeometry:
     """Return an outline without the ground of others; a narrow gap between them is closed."""
     if shapely.is_empty(others):
         return outline
+    # Snapping may fold an outline: then a gap is better than an outline that crosses itself.
     joined = shapely.snap(outline, others, _JOINED_M)
     sound = joined if shapely.is_valid(joined) else outline
     return shapely.difference(sound, others)
@@ -313,6 +318,7 @@ def _footprints(outline: BaseGeometry, digits: int) -> tuple[Footprint, ...]:
 def _overlap(buildings: Iterable[Sequence[Footprint]]) -> bool:
     """Return whether modules of buildings overlap."""
     boxes = [shapely.box(*box) for own in buildings for part in own for box in part.boxes_m]
+    # The union loses what is covered twice; half a module is room for rounding.
     area_m2 = float(shapely.area(boxes).sum())
     return bool(area_m2 > shapely.area(shapely.union_all(boxes)) + 0.5 * MODULE_SIDE_M**2)
 

@@ -72,6 +72,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         for index, line in enumerate(lines)
         for part in shapely.get_parts(line.geometry)
     ]
+    # 1. Ends that nearly meet, brought together; 2. the faces that the lines enclose.
     owners = np.array([index for index, _ in parts])
     sides, gaps_m = _snapped([places for _, places in parts])
     outlines = shapely.get_parts(shapely.polygonize(sides))
@@ -79,6 +80,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     used: dict[int, int] = {}  # line: outline
     found = []
     for outline in outlines:
+        # 3. The lines along the rim are the sides of the outline; the first with a name names it.
         near = tree.query(outline, "intersects")
         rim = shapely.buffer(outline.boundary, _HAIR_M)
         of_rim = sorted({int(owners[k]) for k in near if shapely.covers(rim, sides[k])})
@@ -88,6 +90,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         found.append(replace(chief, geometry=outline))
         for k in of_rim:
             used.setdefault(k, len(found) - 1)
+    # 4. An entry in the ledger for each line, with the gap that was bridged.
     bridged_m = np.zeros(len(lines))
     np.maximum.at(bridged_m, owners, gaps_m)
     chiefs = {group.place for group in found}
@@ -105,6 +108,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
 def _snapped(sides: Sequence[FloatArray]) -> tuple[list[LineString], FloatArray]:
     """Return lines whose ends meet where they are within `CLOSE_M`, and how far each end moved."""
     ends = np.array([places[k] for places in sides for k in (0, -1)]).reshape(-1, 2)
+    # Ends within reach of each other, also by way of others, become one point: the first of them.
     pairs = cKDTree(ends).query_pairs(CLOSE_M, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(ends), len(ends)))
     _, group = connected_components(links, directed=False)
@@ -137,6 +141,8 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     shapes = np.array([things[k].geometry for k in outlines], dtype=object)
     areas = shapely.area(shapes)
     whole = np.asarray(shapely.area(shapely.polygons(shapely.get_exterior_ring(shapes))))
+    # 1. What lies within what: a court if it is clearly smaller, the filling of a border if it is
+    # as large but has holes.
     inner, outer = shapely.STRtree(shapes).query(shapes, "within")
     deep: dict[int, list[int]] = {}
     fillings: dict[int, int] = {}
@@ -148,6 +154,7 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         elif areas[low] < _ALIKE * areas[high] and alike:
             fillings.setdefault(int(high), int(low))
     found, gone = list(things), set()
+    # 2. A filled outline takes the shape of its filling.
     for high, low in fillings.items():
         outline, filling = outlines[high], things[outlines[low]]
         if outlines[low] not in gone:
@@ -155,6 +162,8 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             kind, detail = "fillings of outlines", f"of {found[outline].place}"
             ledger.add(Fate.MERGED, kind, filling.place, filling.name, detail)
             gone.add(outlines[low])
+    # 3. Outlines by depth: those within an odd number of others are courts of the smallest, those
+    # within an even number are buildings that stand in a court.
     for low, around in sorted(deep.items(), key=lambda item: len(item[1])):
         court = things[outlines[low]]
         if outlines[low] in gone:
