@@ -318,7 +318,7 @@ def validation_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str)
 
     Args:
         scenario: It has the titles of the buildings.
-        buildings: A table with `STANDING_COLUMNS`.
+        buildings: A table with columns `validation` and `reason`.
         column: The column with the name of the building.
     """
     for row in buildings.to_dict("records"):

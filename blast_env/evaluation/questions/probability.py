@@ -218,8 +218,8 @@ def level_probability(
     """
     if not judged.responses:
         raise BlastEnvError("no building has a facade: there is no level of protection")
-    # 1. Quantiles of all uncertain quantities; 2. in each draw the lowest level of any deciding bay:
-    # the level of a building is that of its worst bay.
+    # 1. Quantiles of all uncertain quantities; 2. in each draw the lowest level of any deciding
+    # bay: the level of a building is that of its worst bay.
     quantiles = _latin(draws, seed)
     levels = np.full(draws, int(LevelOfProtection.HIGH))
     for own in _deciding(judged.responses, deciding):
