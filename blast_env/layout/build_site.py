@@ -126,15 +126,15 @@ def build_site(
         ScenarioError: If the charge is not clear of a structure or the border.
         ValueError: If the seed is negative.
     """
-    placement = LayoutState.of(scenario, layout)
+    legal = check_layout(scenario, layout)
     # The scenario and the layout are sound with the scenario's own charges, and a vehicle keeps
     # clear of all obstacles: only a charge from elsewhere is checked here.
     if isinstance(charge, Charge) and not scenario.may_have(charge):
-        _check_clear(scenario.with_charge(charge), placement)
+        _check_clear(scenario.with_charge(charge), legal)
     drawn = draw_threat(scenario, seed) if charge is None else charge
-    charge = charge_against(scenario, placement.layout, drawn)
-    structures = outlines(scenario, placement.layout)
-    barrier = standing(placement.layout)
+    charge = charge_against(scenario, legal, drawn)
+    structures = outlines(scenario, legal)
+    barrier = standing(legal)
     if barrier:
         structures += (barrier_outline(scenario, barrier),)
     return BlastSite(
@@ -147,15 +147,15 @@ def build_site(
     )
 
 
-def _check_clear(scenario: Scenario, placement: LayoutState) -> None:
+def _check_clear(scenario: Scenario, layout: Layout) -> None:
     """Refuse a layout with a module on the charge, the only condition that a charge can break.
 
     Raises:
         LayoutError: If there is one.
     """
     usable = usable_cells(scenario)
-    if not all(usable[cell] for cell in placement.cells):
-        check_layout(scenario, placement.layout)
+    if not all(usable[cell] for cell in LayoutState(scenario, layout).cells):
+        check_layout(scenario, tuple(layout))  # a plain one, which is not known to be legal here
 
 
 def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:

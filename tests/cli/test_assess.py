@@ -39,9 +39,11 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
     )
     files = ("--picture", picture, "--diagram", diagram, "--table", table)
     output = run(site, "--tnt-kg", "1", "--target", "medium", "--cell", "0.5", *files)
-    engine, cost, verdict = output.splitlines()[:3]
+    # On a slow machine lines of progress come between the cost and the verdict.
+    engine, cost, *rest = output.splitlines()
     assert cost.startswith("up to a blast of gas")
     assert engine.startswith("engine gas ")
+    verdict = next(line for line in rest if line.startswith("glazed_room"))
     assert verdict.startswith(
         "glazed_room, no barrier: DOES NOT COMPLY: level of protection below M"
     )

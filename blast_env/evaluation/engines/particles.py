@@ -133,7 +133,7 @@ class EventEngine(ParticleEngine):
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
     """Return a particle engine by its name, or the engine itself; refuse any other engine."""
-    found = find_engine(engine)
+    found = engine if isinstance(engine, ParticleEngine) else find_engine(engine)
     if not isinstance(found, ParticleEngine):
         raise BlastEnvError(
             f"engine {found.name!r} has no particles: this is for the particle engines"
