@@ -95,14 +95,11 @@ class Rectangle(NamedTuple):
         """Return the rectangle with all coordinates multiplied by `factor`."""
         return Rectangle(*(factor * value for value in self))
 
-    def contains(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
+    def contains(self, other: "Rectangle") -> bool:
         """Whether `other` lies inside; sides may touch."""
-        return (
-            other.left >= self.left - tolerance
-            and other.bottom >= self.bottom - tolerance
-            and other.right <= self.right + tolerance
-            and other.top <= self.top + tolerance
-        )
+        left, bottom, right, top = self.grown(TOLERANCE_M)
+        inside = left <= other.left and bottom <= other.bottom
+        return inside and other.right <= right and other.top <= top
 
     def overlaps(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
         """Whether the interiors intersect; rectangles that only touch do not overlap."""

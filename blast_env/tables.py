@@ -76,20 +76,12 @@ def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
     return converted
 
 
-def markdown_table(
-    headers: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: bool = False
-) -> str:
-    """Return a Markdown table; vertical bars in cells are escaped.
-
-    Args:
-        headers: Headers of the columns.
-        rows: The cells.
-        numbers: Whether all columns but the first hold numbers, which are aligned right.
-    """
+def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a Markdown table of headers and cells; vertical bars in cells are escaped."""
     lines = [headers, *rows]
     cells = [[str(cell).replace("|", r"\|") for cell in line] for line in lines]
     text = [f"| {' | '.join(line)} |" for line in cells]
-    rule = "|---" + ("|---:" if numbers else "|---") * (len(headers) - 1) + "|"
+    rule = "|---" * len(headers) + "|"
     return "\n".join([text[0], rule, *text[1:]])
 
 

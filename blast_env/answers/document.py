@@ -88,10 +88,10 @@ class Number:
         return f"{signs.plus_minus} {_digits(error, self.digits, _ERROR_FIGURES)}"
 
     @classmethod
-    def stated(cls, value: float, unit: str = "") -> Self:
+    def stated(cls, value: float) -> Self:
         """Return a number that a user gave, with all of its digits."""
         digits = len(f"{value:.10f}".rstrip("0").partition(".")[2]) if isfinite(value) else None
-        return cls(value, unit, digits=digits)
+        return cls(value, digits=digits)
 
     @classmethod
     def share(cls, share: float, error: float = nan, *, flag: str = "") -> Self:

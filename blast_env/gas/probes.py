@@ -145,8 +145,8 @@ class LoadTable:
 class FaceLoads(LoadTable):
     """Recorder of the loads on the faces of the solver."""
 
-    def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA) -> None:
-        super().__init__(count, arrival_pa, is_mean=True)
+    def __init__(self, count: int) -> None:
+        super().__init__(count, is_mean=True)
 
     def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
@@ -254,20 +254,16 @@ class Gauges(LoadTable):
     Args:
         grid: The grid.
         cells: The cells, x, y and z (n, 3).
-        arrival_pa: Overpressure at which a wave has arrived.
 
     Raises:
         BlastEnvError: If a cell is solid or outside the grid.
     """
 
     def __init__(
-        self,
-        grid: GasGrid,
-        cells: Sequence[tuple[int, int, int]] | NDArray[np.int64],
-        arrival_pa: float = ARRIVAL_PA,
+        self, grid: GasGrid, cells: Sequence[tuple[int, int, int]] | NDArray[np.int64]
     ) -> None:
         self.cells = np.asarray(cells, dtype=np.int64).reshape(-1, 3)
-        super().__init__(len(self.cells), arrival_pa, is_mean=False)
+        super().__init__(len(self.cells), is_mean=False)
         for cell in self.cells:
             if (cell < 0).any() or (cell >= grid.shape).any():
                 raise BlastEnvError(f"gauge in cell {cell.tolist()}, but the grid is {grid.shape}")

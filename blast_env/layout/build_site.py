@@ -36,18 +36,13 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     return tuple(np.random.default_rng(child) for child in children)
 
 
-def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -> Charge:
-    """Return the charge of a scenario for a seed.
-
-    Args:
-        scenario: The scenario.
-        seed: Seed of the random draw.
-        layout: The layout, on which the place of a vehicle's charge depends; see `worst_places`.
+def draw_charge(scenario: Scenario, seed: int) -> Charge:
+    """Return the charge of a scenario for a seed; that of a vehicle, at its place without a layout.
 
     Raises:
         ValueError: If the seed is negative.
     """
-    return charge_against(scenario, layout, draw_threat(scenario, seed))
+    return charge_against(scenario, (), draw_threat(scenario, seed))
 
 
 def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:

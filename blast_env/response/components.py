@@ -130,13 +130,13 @@ def catalogue() -> dict[str, Glazing | Wall]:
         raise BlastEnvError(f"components.toml: {error}") from None
 
 
-def find_component(name: str, own: dict[str, Glazing | Wall] | None = None) -> Glazing | Wall:
-    """Return a component by name, from a scenario's components or else the catalogue.
+def find_component(name: str) -> Glazing | Wall:
+    """Return a component of the catalogue by name.
 
     Raises:
         UnknownNameError: If there is none; the message suggests the nearest one.
     """
-    known = {**catalogue(), **(own or {})}
+    known = catalogue()
     if name not in known:
         raise UnknownNameError("component", name, known)
     return known[name]

@@ -85,18 +85,11 @@ class Resistance:
         return float(np.interp(self.cap_pa, self.pressure_pa, self.deflection_m))
 
     @classmethod
-    def elastic_plastic(
-        cls, stiffness_pa_m: float, cap_pa: float, rebound_cap_pa: float | None = None
-    ) -> "Resistance":
+    def elastic_plastic(cls, stiffness_pa_m: float, cap_pa: float) -> "Resistance":
         """Return a bilinear resistance: elastic, then perfectly plastic."""
         # Elastic to the cap, perfectly plastic beyond it.
         yield_m = cap_pa / stiffness_pa_m
-        return cls(
-            np.array([0.0, yield_m]),
-            np.array([0.0, cap_pa]),
-            cap_pa,
-            cap_pa if rebound_cap_pa is None else rebound_cap_pa,
-        )
+        return cls(np.array([0.0, yield_m]), np.array([0.0, cap_pa]), cap_pa, cap_pa)
 
 
 @dataclass(frozen=True, eq=False)

@@ -245,21 +245,16 @@ def _put_differs(
 
 
 class Memory:
-    """The pieces known for each charge, cleared when they exceed a bound; copies begin empty.
+    """The pieces known for each charge, cleared when they exceed a bound; copies begin empty."""
 
-    Args:
-        most_bytes: The bound.
-    """
-
-    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
-        self._most_bytes = most_bytes
+    def __init__(self) -> None:
         self._kept: dict[Hashable, PieceKnowledge] = {}
         self._bytes: dict[Hashable, int] = {}
         self._total_bytes = 0
 
-    def __reduce__(self) -> tuple[type["Memory"], tuple[int]]:
-        """Pickle the bound alone."""
-        return Memory, (self._most_bytes,)
+    def __reduce__(self) -> tuple[type["Memory"], tuple[()]]:
+        """Pickle nothing."""
+        return Memory, ()
 
     def numbers_of(
         self,
@@ -274,7 +269,7 @@ class Memory:
             make: Makes the known pieces of the key, if there are none.
             layouts: The pieces of each layout.
         """
-        if self._total_bytes > self._most_bytes:
+        if self._total_bytes > _MOST_BYTES:
             self._kept.clear()
             self._bytes.clear()
             self._total_bytes = 0

@@ -264,16 +264,15 @@ def kingery_bulmash_reference(
     distances_m: tuple[float, ...],
     charge_kg: float,
     quantity: ImpulseQuantity = "reflected_impulse",
-    burst: Literal["hemispherical", "spherical"] = "hemispherical",
 ) -> Reference:
-    """Return Kingery and Bulmash's impulse.
+    """Return Kingery and Bulmash's impulse of a hemispherical burst.
 
     Raises:
         BlastEnvError: If a distance is outside the range of the curves.
     """
-    impulse_pa_s = kingery_bulmash(quantity, np.array(distances_m), charge_kg, burst)
+    impulse_pa_s = kingery_bulmash(quantity, np.array(distances_m), charge_kg)
     section = ReferenceSection(
-        source="Kingery-Bulmash", quantity=quantity, burst=burst, charge_kg=charge_kg
+        source="Kingery-Bulmash", quantity=quantity, burst="hemispherical", charge_kg=charge_kg
     )
     return Reference(section, impulse_pa_s / PA_PER_PSI)
 
