@@ -74,6 +74,15 @@ matrix-%: $(VENV)/.uv
 	$(MATRIX_PYTHON) -m pytest --numprocesses auto --dist worksteal -m "not slow" \
 		$(if $(filter lowest,$*),-W ignore::DeprecationWarning) $(MATRIX_TESTS)
 
+# Tests of what needs a large package that nothing else needs, in a copy of the environment.
+matrix: matrix-minari
+matrix-minari: $(STAMP) $(VENV)/.uv
+	mkdir -p out/matrix
+	$(BIN)/uv venv --quiet --clear --system-site-packages --python $(BIN)/python out/matrix/minari
+	$(BIN)/uv pip install --quiet --python out/matrix/minari/bin/python -e ".[all,datasets,dev]" \
+		-c constraints.txt
+	out/matrix/minari/bin/python -m pytest -rs tests/studies/test_offline_data.py
+
 $(VENV)/.uv: $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt uv
 	touch $@

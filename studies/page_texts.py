@@ -21,6 +21,9 @@ _TEXT: Final = re.compile(
 )
 _CODE: Final = re.compile(r"^(Attributes|Args|Returns|Raises):$", re.MULTILINE)
 
+_EXAMPLE: Final = re.compile(r"^>>> .*\n(?:^(?!$|#).*\n)*", re.MULTILINE)
+"""A doctest, up to an empty line or a heading."""
+
 
 def docstring_text(path: str) -> str:
     """Return the docstring of a class or function, without its sections for code.
@@ -30,7 +33,7 @@ def docstring_text(path: str) -> str:
     """
     module, _, name = path.rpartition(".")
     text = inspect.getdoc(getattr(import_module(module), name)) or ""
-    return _CODE.split(text)[0].strip()
+    return _EXAMPLE.sub(r"\n```pycon\n\g<0>```\n", f"{_CODE.split(text)[0].strip()}\n").strip()
 
 
 def with_texts(page: str) -> str:

@@ -15,6 +15,12 @@ def register_environments() -> None:
         id="BlastSimulator-v0",
         entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
     )
+    gym.register(
+        id="BlastBarrier-MO-v0",
+        entry_point="blast_env.envs.two_objectives:BlastBarrierTwoObjectivesEnv",
+        disable_env_checker=True,  # Gymnasium's knows no vectors as rewards
+        kwargs={"scenario": "courtyard"},
+    )
     _register_barrier("BlastBarrier-v0", scenario="courtyard")
     _register_barrier("BlastBarrierGas-v0", scenario="courtyard", engine="gas")
     _register_barrier("BlastBarrierSites-v0", scenario=SITES)

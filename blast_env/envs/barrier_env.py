@@ -75,9 +75,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     The rewards of an episode add up to minus the weighted impulse on the protected structures
     (psi s; psi for peaks) and the cost of illegal actions. `info["reward_terms"]` has the terms.
     `reward="terminal"` pays when the charge goes off. Its first step costs a deposit of twice the
-    impulse without a barrier, returned at the end, so that truncation never pays. `"incremental"`
-    pays the reduction by each module at once. `"relative"` pays `info["reduction"]` at the end, of
-    the order of 1 on every site: the one to train with.
+    impulse without a barrier, returned at the end, so that truncation never pays. With
+    `"incremental"` each module pays its reduction at once. With `"relative"` the end pays
+    `info["reduction"]`, of the order of 1 on every site: the one to train with.
 
     ## Starting state
     The build zone is empty. `threat="visible"` draws one charge and shows it; `"hidden"` draws
@@ -92,6 +92,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
 
     ## Arguments
     See `__init__`.
+
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})

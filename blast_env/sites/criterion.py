@@ -145,7 +145,7 @@ class Visibility:
 
 def _all_lines(scenario: Scenario) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return origins (lines, 2), directions (lines, 2) and weights of sources (lines,)."""
-    places = [(place, source.weight) for source in scenario.charge for place in _places(source)]
+    places = [(place, source.weight) for source in scenario.charge for place in places_of(source)]
     origin = np.repeat(np.array([place for place, _ in places]), DIRECTIONS, axis=0)
     weight = np.repeat(np.array([weight for _, weight in places]), DIRECTIONS)
     return origin, np.tile(np.array(_directions()), (len(places), 1)), weight
@@ -169,7 +169,7 @@ def _directions() -> tuple[tuple[float, float], ...]:
     return tuple((round(cos(angle), 9), round(sin(angle), 9)) for angle in angles)
 
 
-def _places(source: AnySource) -> list[PointM]:
+def places_of(source: AnySource) -> list[PointM]:
     """Return the places of a source: the centres of equal parts of it.
 
     Those of a vehicle lie along its entries, since its reach depends on the layout.

@@ -202,6 +202,9 @@ SMALLER: Final[dict[str, str]] = {
 """Options that are appended to studies and trainings of minutes to hours."""
 
 NOT_RUN: Final[dict[str, str]] = {
+    "python -m studies.offline_data --scenario control_room --episodes 20": (
+        "needs Minari, and so JAX"
+    ),
     "python -m studies.bench --site visitor_entrance --site control_room --site school_and_clinic"
     " --site hotel_forecourt --site shopping_street --site courtyard --site street_front"
     " --site large --cells uniform --cells coarse": (
