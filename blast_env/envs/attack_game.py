@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -38,7 +39,7 @@ _SEED: Final = 0
 _LARGEST_KG: Final = 1000.0
 
 
-def env(**keywords: Any) -> "OrderEnforcingWrapper":
+def env(**keywords: Any) -> Any:
     """Return the game with PettingZoo's checks of the order of calls and of actions.
 
     Args:
@@ -73,7 +74,7 @@ class _NoBlast(Engine):
         return BlastLoads(loads, np.zeros(modules))
 
 
-class AttackGame(AECEnv[str, dict[str, Any], int]):
+class AttackGame(AECEnv[str, dict[str, Any], int]):  # type: ignore[misc]  # untyped package
     """The defender places barriers one by one; then the attacker chooses where a charge goes off.
 
     The defender's actions are those of `BlastBarrierEnv` with `action="place"`. When it finishes,
@@ -100,7 +101,7 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):
         BlastEnvError: If the scenario has no build zone, or nothing arrives without a barrier.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {
         "name": "blast_attack_v0",
         "render_modes": [],
         "is_parallelizable": False,
@@ -122,16 +123,16 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):
         self.possible_agents = [DEFENDER, ATTACKER]
         self.render_mode = None
         actions = {
-            DEFENDER: self.placing.action_space,
+            DEFENDER: spaces.Discrete(self.scenario.zone.catalogue.finish + 1),
             ATTACKER: spaces.Discrete(len(self.charges)),
         }
-        self._actions = actions
+        self._actions: dict[str, spaces.Discrete] = actions
         self._observations = {
             agent: spaces.Dict(
                 {
                     "observation": self.placing.observation_space,
                     "places": spaces.Box(0.0, 1.0, (len(self.charges), 3), np.float32),
-                    "action_mask": spaces.Box(0, 1, (int(space.n),), np.int8),  # type: ignore[attr-defined]
+                    "action_mask": spaces.MultiBinary(int(space.n)),
                 }
             )
             for agent, space in actions.items()
@@ -219,7 +220,7 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):
         return self.placing.placement
 
     @property
-    def _places(self) -> FloatArray:
+    def _places(self) -> NDArray[np.float32]:
         site = self.scenario.site
         rows = []
         for charge in self.charges:
@@ -227,7 +228,7 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):
             x_m, y_m = met.position_m
             mass = min(np.cbrt(met.tnt_kg / _LARGEST_KG), 1.0)
             rows.append((x_m / site.width_m, y_m / site.height_m, mass))
-        return np.clip(np.array(rows), 0.0, 1.0).astype(np.float32)  # type: ignore[return-value]
+        return np.array(np.clip(rows, 0.0, 1.0), dtype=np.float32)
 
     @property
     def _in_reach(self) -> BoolArray:

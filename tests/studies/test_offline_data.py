@@ -55,7 +55,8 @@ def test_it_records_episodes_of_every_id(name: str, tmp_path: Path, monkeypatch:
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     # Minari stores arrays of bytes with three axes as pictures of one, three or four channels.
     shown = {"observation": "grid"} if name.startswith("BlastBarrier") else {}
-    env = gym.make(name, max_episode_steps=3, **shown, **arguments(name))
+    options: dict[str, Any] = shown | arguments(name)
+    env = gym.make(name, max_episode_steps=3, **options)
     collector = minari.DataCollector(env, record_infos=True)
     for seed in range(2):
         _, info = collector.reset(seed=seed)
