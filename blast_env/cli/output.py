@@ -176,7 +176,12 @@ def progress_bar(label: str) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def blasts_running(
-    label: str, words: str, costs: Iterable[CostGuess | None], *, is_quiet: bool = False
+    label: str,
+    words: str,
+    costs: Iterable[CostGuess | None],
+    *,
+    drawn: int = 0,
+    is_quiet: bool = False,
 ) -> Iterator[Callable[..., None]]:
     """Say what runs the blasts of a block, and their cost; then show their progress.
 
@@ -184,6 +189,7 @@ def blasts_running(
         label: What runs, beside the bar.
         words: The engine in words.
         costs: Estimated cost of each blast; `None` for one without an estimate.
+        drawn: Number of blasts with pictures, which take time as well.
         is_quiet: Whether only the progress is shown, since standard output is for JSON.
 
     Yields:
@@ -193,7 +199,7 @@ def blasts_running(
         print_line(words)
         known = [cost for cost in costs if cost is not None]
         if known:
-            print_line(f"up to {cost_words(known)}")
+            print_line(f"up to {cost_words(known, drawn)}")
     with progress_bar(label) as progress:
         yield progress
 

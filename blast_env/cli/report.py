@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from blast_env.answers.terminal import print_line
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     CHARGE,
@@ -22,9 +21,8 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     InterruptedCommandError,
-    message_console,
+    blasts_running,
     print_written,
-    progress_bar,
     resumable,
 )
 from blast_env.errors import BlastEnvError, value_text
@@ -93,11 +91,13 @@ def report(
     given = reports.ReportDetails.read(details)
     check_layout(site, elements)
     cost = reports.StudyPlan(site, tuple(elements), options).cost()
-    message_console().print(cost.words)
     resume = resume_words(cache)
     if cache is not None:
         resume = f"{resume}, and draws the threats again"
-    with resumable(resume), progress_bar(f"report on {site.name}") as progress:
+    coarse, fine = options.engines
+    label, words = f"report on {site.name}", f"{coarse.describe()} and {fine.cell_words}"
+    running = blasts_running(label, words, cost.blasts, drawn=cost.drawn)
+    with resumable(resume), running as progress:
 
         def tell(label: str, part: float) -> None:
             share = cost.share(label, part)
@@ -105,8 +105,6 @@ def report(
                 progress(share)
 
         found = reports.run_report(site, elements, options, tell)
-    coarse, fine = options.engines
-    print_line(f"{coarse.describe()} and {fine.cell_words}")
     print_written(reports.write_report(found, out, pdf, given))
     if stopped := found.study.stopped:
         raise InterruptedCommandError(f"{out} has the parts finished before: {stopped}", resume)

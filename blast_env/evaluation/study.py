@@ -29,7 +29,7 @@ from blast_env.evaluation.questions.reduction import ThreatOutcome
 from blast_env.evaluation.questions.verdict import Consequences, consequences_by_layout
 from blast_env.evaluation.record import BlastRecord
 from blast_env.evaluation.store import BlastStore
-from blast_env.gas.cost import CostGuess, cost_words
+from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, standing
 from blast_env.layout import check_layout
@@ -278,9 +278,9 @@ class StudyCost(NamedTuple):
     drawn: int
 
     @property
-    def words(self) -> str:
-        """The cost in words."""
-        return cost_words([cost for costs in self.parts.values() for cost in costs], self.drawn)
+    def blasts(self) -> tuple[CostGuess, ...]:
+        """The cost of each blast."""
+        return tuple(cost for costs in self.parts.values() for cost in costs)
 
     def share(self, label: str, share: float) -> float | None:
         """Return the completed share of the whole at a share of a part; `None` of no part."""

@@ -14,6 +14,7 @@ from blast_env.app.sources import layout_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.study import final_cells
 from blast_env.files import scratch_folder
+from blast_env.gas.cost import cost_words
 from blast_env.gas.settings import Cells
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.provenance import versions
@@ -169,7 +170,8 @@ class ReportDialog:
         }
 
     def _say_cost(self) -> None:
-        self._cost.text = self._session.cost_of_report(**self._contents).words
+        cost = self._session.cost_of_report(**self._contents)
+        self._cost.text = cost_words(cost.blasts, cost.drawn)
 
     def _begin(self) -> None:
         session = self._session
