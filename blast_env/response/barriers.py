@@ -27,6 +27,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.response.sdof import check_histories
 
 CONCRETE_KG_M3: Final = 2400.0
 """Density of a piece, unless its mass is given."""
@@ -157,10 +158,7 @@ def piece_responses(
     Raises:
         BlastEnvError: If there is not one history per piece.
     """
-    if pressure_pa.shape != (len(pieces), len(time_s)):
-        raise BlastEnvError(
-            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(pieces)}, {len(time_s)})"
-        )
+    check_histories(len(pieces), time_s, pressure_pa)
     from blast_env.response.kernels import move_piece
 
     rows = np.zeros((len(pieces), 4))

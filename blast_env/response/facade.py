@@ -26,7 +26,7 @@ from blast_env.response.glass import (
     drawn_conditions,
     glazing_responses,
 )
-from blast_env.response.sdof import impulses
+from blast_env.response.sdof import check_histories, impulses
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
 
 STOREY_M = 3.5
@@ -535,10 +535,7 @@ def respond(
     Raises:
         BlastEnvError: If there is not one history per bay.
     """
-    if pressure_pa.shape != (len(bays), len(time_s)):
-        raise BlastEnvError(
-            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(bays)}, {len(time_s)})"
-        )
+    check_histories(len(bays), time_s, pressure_pa)
     glazed = [index for index, bay in enumerate(bays) if bay.glazing is not None]
     walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
     panes = _panes(bays)

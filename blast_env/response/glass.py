@@ -37,6 +37,7 @@ from blast_env.response.sdof import (
     STEPS_PER_PERIOD,
     Resistance,
     System,
+    check_histories,
     impulses,
 )
 
@@ -409,10 +410,7 @@ def glazing_responses(
     Raises:
         BlastEnvError: If there is not one history per pane.
     """
-    if pressure_pa.shape != (len(panes), len(time_s)):
-        raise BlastEnvError(
-            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
-        )
+    check_histories(len(panes), time_s, pressure_pa)
     rows, impulse_pa_s = np.zeros((len(panes), 7)), impulses(time_s, pressure_pa)
     for index, pane in enumerate(panes):
         _bend(pane, time_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])

@@ -142,6 +142,18 @@ class Responses:
     cracked: FloatArray
 
 
+def check_histories(count: int, time_s: FloatArray, pressure_pa: FloatArray) -> None:
+    """Refuse pressures (count, times) of another shape.
+
+    Raises:
+        BlastEnvError: If there is not one history per component, with a value at each time.
+    """
+    if pressure_pa.shape != (count, len(time_s)):
+        raise BlastEnvError(
+            f"pressure_pa has shape {pressure_pa.shape}, must be ({count}, {len(time_s)})"
+        )
+
+
 def responses(
     systems: Sequence[System],
     time_s: FloatArray,
@@ -159,10 +171,7 @@ def responses(
     Raises:
         BlastEnvError: If there is not one history per system, or times do not ascend.
     """
-    if pressure_pa.shape != (len(systems), len(time_s)):
-        raise BlastEnvError(
-            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(systems)}, {len(time_s)})"
-        )
+    check_histories(len(systems), time_s, pressure_pa)
     if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
         raise BlastEnvError("time_s must ascend, and have at least two times")
     # The impulse until each point is summed once; the kernel interpolates in it, so that a load
