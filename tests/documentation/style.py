@@ -27,7 +27,7 @@ _ITEM: Final = re.compile(r"(?:[-*]|\d+\.)\s+")
 _LINK: Final = re.compile(r"!?\[([^\]]*)\](?:\([^)]*\))?")
 _CODE: Final = re.compile(r"`[^`]*`")
 _END: Final = re.compile(r"(?<=[.!?])[*\")]*\s+(?=[\"(*`\[]*[A-Z\d`*])")
-_NO_TEXT: Final = ("#", "|", "![", "<", ":")
+_NO_TEXT: Final = ("#", "|", "![", "<", ":", ">>>", "...")
 
 
 def faults(text: str) -> list[str]:
@@ -55,7 +55,7 @@ def faults(text: str) -> list[str]:
 def sentences(text: str) -> Iterator[str]:
     """Yield the sentences of a page: those of its paragraphs and items, without tables and code."""
     for paragraph in _paragraphs(text):
-        yield from _END.split(_CODE.sub("code", _LINK.sub(r"\1", paragraph)))
+        yield from _END.split(_CODE.sub("`code`", _LINK.sub(r"\1", paragraph)))
 
 
 def _words(sentence: str) -> list[str]:
