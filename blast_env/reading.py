@@ -92,14 +92,15 @@ class Reading(Generic[Found]):
         finally:
             self.end()
         try:
-            found, fault = pickle.loads(answer)
+            outcome: tuple[Found, BaseException | None] = pickle.loads(answer)
         except (EOFError, pickle.UnpicklingError):
             raise self._died() from None
+        found, fault = outcome
         if isinstance(fault, MemoryError):
             raise self._too_large()
         if fault is not None:
             raise fault
-        return found  # type: ignore[no-any-return]
+        return found
 
     def end(self) -> None:
         """End the process if it still runs; safe to call from another thread."""

@@ -344,7 +344,7 @@ class Panel:
         """The panel as a single-degree-of-freedom system, per area."""
         stiffness_pa_m, cap_pa = self._strength()
         if isinstance(self.section, Masonry):
-            resistance = self._rocking(stiffness_pa_m, cap_pa)
+            resistance = self._rocking(self.section, stiffness_pa_m, cap_pa)
         else:
             resistance = Resistance.elastic_plastic(stiffness_pa_m, cap_pa)
         if isinstance(self.section, ReinforcedConcrete):
@@ -394,15 +394,14 @@ class Panel:
             growth = np.maximum(growth, 8.0 * tension_n * deflection_m / self.span_m**2 / cap_pa)
         return deflection_m, growth
 
-    def _rocking(self, stiffness_pa_m: float, cap_pa: float) -> Resistance:
+    def _rocking(self, section: Masonry, stiffness_pa_m: float, cap_pa: float) -> Resistance:
         """Return a resistance that drops at cracking to that of the panel's weight.
 
         Cracked at mid-height, the halves rock: their resistance falls from 4 m g h / L at zero
         deflection to 0 at a deflection of the thickness h (Paulay & Priestley 1992). It is 0 at
         zero deflection and rises over the first hundredth of the thickness.
         """
-        section = self.section
-        thickness = section.thickness_m  # type: ignore[union-attr]
+        thickness = section.thickness_m
         # Moment equilibrium of one half about its end: its weight acts with the arm of the
         # thickness.
         weight = 4.0 * section.mass_kg_m2 * _GRAVITY_M_S2 * thickness / self.span_m

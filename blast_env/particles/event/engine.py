@@ -281,7 +281,7 @@ def _compiled(source_digest: int) -> Callable[..., int]:
     return function
 
 
-_RUN: Final = _compiled(_source_digest())
+_RUN: Final[Any] = _compiled(_source_digest())
 
 
 def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
@@ -292,7 +292,7 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
     """
     answer = PAUSED
     while answer == PAUSED:
-        if _RUN.signatures:  # type: ignore[attr-defined]
+        if _RUN.signatures:
             answer = int(_RUN(*world, record, until_s))
         else:
             with _FIRST_CALL, compilation_notice("the event engine (some 10 s)"):
