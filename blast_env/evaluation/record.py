@@ -100,7 +100,7 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
     Impulses are means over the area of the counted walls. Where the engine has no areas, the
     weights of the structures replace them.
     """
-    if all(item.building == item.name for item in loads):  # the usual case
+    if all(load.building == load.name for load in loads):  # the usual case
         return tuple(loads)
     parts: dict[str, list[StructureLoad]] = {}
     for load in loads:

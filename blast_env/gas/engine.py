@@ -377,7 +377,7 @@ def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
     for end_m, (whole_m, of_cells_m) in zip(ends_m, both, strict=True):
         end_m[...] = air_height_m if whole_m is None else whole_m
         if outline.cells is not None and of_cells_m is not None:
-            known_m = [air_height_m if cell_m is None else cell_m for cell_m in of_cells_m]
+            known_m = [air_height_m if height_m is None else height_m for height_m in of_cells_m]
             end_m[tuple(np.array(outline.cells).T)] = known_m
     return ends_m
 

@@ -112,7 +112,7 @@ class GasSettings:
     def __post_init__(self) -> None:
         """Check the arguments."""
         if self.cells not in CELLS:
-            known = ", ".join(repr(item) for item in CELLS)
+            known = ", ".join(repr(name) for name in CELLS)
             raise BlastEnvError(f"cells is {value_text(self.cells)}, must be one of {known}")
         cell_m = finite_number("cell_m", self.cell_m)
         cells = MODULE_SIDE_M / cell_m if cell_m >= _LEAST_CELL_M else 0.0

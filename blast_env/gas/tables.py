@@ -195,7 +195,7 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
         run: The run.
         faces: Its `face_table`, whose column `share` is the area ratio of real wall to face.
     """
-    counting = {item.name: item.faces for item in run.site.structures if not item.is_barrier}
+    counting = {own.name: own.faces for own in run.site.structures if not own.is_barrier}
     own = faces[faces["structure"].isin(list(counting))]
     table = _grouped(run, own, ["structure", "face"])
     walls = zip(table["structure"], table["face"], strict=True)

@@ -271,7 +271,7 @@ def refinement(
         rows = []
         for name in scenario or ["courtyard", "street_front"]:
             site = street(_STREET_M) if name == LARGE else load_scenario(name)
-            found = [compare_cells(site, row) for row in engines]
+            found = [compare_cells(site, engine) for engine in engines]
             for row in found:
                 for load, wanted in zip(row.loads, found[-1].loads, strict=True):
                     rows.append(

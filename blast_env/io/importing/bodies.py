@@ -63,9 +63,9 @@ class Faces:
     def of(cls, corners_m: Sequence[FloatArray]) -> "Faces":
         """Return the faces with these corners, each (k, 3), k at least 3."""
         plans = np.empty(len(corners_m), dtype=object)
-        plans[:] = [_plan(corner_m[:, :2]) for corner_m in corners_m]
-        low_m = np.array([corner_m[:, 2].min() for corner_m in corners_m])
-        return cls(plans, low_m, np.array([corner_m[:, 2].max() for corner_m in corners_m]))
+        plans[:] = [_plan(face_m[:, :2]) for face_m in corners_m]
+        low_m = np.array([face_m[:, 2].min() for face_m in corners_m])
+        return cls(plans, low_m, np.array([face_m[:, 2].max() for face_m in corners_m]))
 
     @classmethod
     def of_triangles(cls, corners_m: FloatArray) -> "Faces":
@@ -82,7 +82,7 @@ class Faces:
         """Return the faces of several bodies."""
         found = [cls.of([]), *several]
         return cls(
-            *(np.concatenate([getattr(point, key.name) for point in found]) for key in fields(cls))
+            *(np.concatenate([getattr(faces, key.name) for faces in found]) for key in fields(cls))
         )
 
     @property

@@ -112,13 +112,13 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     has that of its lowest part. A part without a building is one.
     """
     wholes = [thing for thing in things if not thing.is_part]
-    tree = shapely.STRtree([item.geometry for item in wholes])
+    tree = shapely.STRtree([whole.geometry for whole in wholes])
     parts: dict[int, list[Thing]] = {}
     found = []
     for part in things:
         if not part.is_part:
             continue
-        own = next((k for k, item in enumerate(wholes) if item.place == part.part_of), None)
+        own = next((k for k, whole in enumerate(wholes) if whole.place == part.part_of), None)
         own = _building_of(part, wholes, tree) if own is None else own
         if own is None:
             found.append(replace(part, is_part=False))
@@ -171,7 +171,7 @@ def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     begins there where they overlap.
     """
     order = sorted(
-        (item for item in things if not item.carries),
+        (thing for thing in things if not thing.carries),
         key=lambda building: (
             -bool(building.is_part),
             -(building.height_m or 0.0),
@@ -179,7 +179,7 @@ def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
         ),
     )
     tree = shapely.STRtree([building.geometry for building in order])
-    found = [item for item in things if item.carries]
+    found = [thing for thing in things if thing.carries]
     left = list(order)
     for k, thing in enumerate(order):
         shape = thing.geometry

@@ -139,7 +139,7 @@ def _imported(path: Path, options: ImportOptions) -> SiteImport:
     site_map.settle(
         {
             **dict.fromkeys(streets, str(Role.CHARGE)),
-            **{item.place: str(Role.BUILDING) for item in buildings},
+            **{building.place: str(Role.BUILDING) for building in buildings},
             **_others(site, buildings),
         }
     )
@@ -169,7 +169,7 @@ def _imported(path: Path, options: ImportOptions) -> SiteImport:
 def _others(site: SitePlacement, buildings: tuple[BuildingFit, ...]) -> dict[str, str]:
     """Return the roles of the outlines and texts that are used, by their places in the file."""
     options = site.options
-    built = shapely.union_all([thing.outline for thing in buildings])
+    built = shapely.union_all([building.outline for building in buildings])
     used = {}
     for thing in site.things:
         if thing.role in (Role.BUILDING, Role.CHARGE):
@@ -230,9 +230,9 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
 
 def _structures(building: BuildingFit, buildings: tuple[BuildingFit, ...]) -> list[dict[str, Any]]:
     """Return the structures of a building; with its parts they have a total weight of 1."""
-    group = [polygon for polygon in buildings if polygon.group == building.group]
-    walls = [(polygon, part.polygon.length) for polygon in group for part in polygon.polygons]
-    whole = sum(length_m * polygon.wall_height_m for polygon, length_m in walls)
+    group = [other for other in buildings if other.group == building.group]
+    walls = [(other, part.polygon.length) for other in group for part in other.polygons]
+    whole = sum(length_m * other.wall_height_m for other, length_m in walls)
     parts = []
     for name, polygon in zip(building.part_names, building.polygons, strict=True):
         outline, *courtyards = ([list(place) for place in ring] for ring in polygon.rings)

@@ -27,11 +27,11 @@ def without_doubles(buildings: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     found, gone = list(buildings), set[int]()
     usable = [
         k
-        for k, outline in enumerate(found)
-        if not outline.is_part
-        and not outline.carries
-        and outline.geometry.area
-        and outline.geometry.is_valid
+        for k, thing in enumerate(found)
+        if not thing.is_part
+        and not thing.carries
+        and thing.geometry.area
+        and thing.geometry.is_valid
     ]
     shapes = np.array([found[k].geometry for k in usable], dtype=object)
     for first, second in sorted(shapely.STRtree(shapes).query(shapes, "intersects").T.tolist()):
@@ -48,7 +48,7 @@ def without_doubles(buildings: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             Fate.MERGED, _TWICE, found[double].place, found[double].name, f"by {found[kept].place}"
         )
         found[kept] = _with_words_of(found[kept], found[double])
-    return [outline for k, outline in enumerate(found) if k not in gone]
+    return [thing for k, thing in enumerate(found) if k not in gone]
 
 
 def _may_be_one(one: Thing, other: Thing) -> bool:

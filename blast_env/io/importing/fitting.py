@@ -228,7 +228,7 @@ def _kept(site: SitePlacement) -> list[Thing]:
         BlastEnvError: If there are too many buildings, or their outlines are too long.
     """
     least_m2 = site.options.least_area_m2
-    outlines = np.array([item.geometry for item in site.of_role(Role.BUILDING)], dtype=object)
+    outlines = np.array([thing.geometry for thing in site.of_role(Role.BUILDING)], dtype=object)
     outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
     kept = []
     inside = shapely.intersection(outlines, site.box)
@@ -244,8 +244,8 @@ def _kept(site: SitePlacement) -> list[Thing]:
             kept.append((replace(thing, geometry=area), outline))
     if len(kept) > MOST_STRUCTURES:
         raise _too_many(site, f"there are {len(kept)} buildings on the site, must be")
-    check_outlines([item.geometry for item, _ in kept], f"{site.path}: the buildings")
-    return [replace(item, name=item.name or _written_in(site, whole)) for item, whole in kept]
+    check_outlines([thing.geometry for thing, _ in kept], f"{site.path}: the buildings")
+    return [replace(thing, name=thing.name or _written_in(site, whole)) for thing, whole in kept]
 
 
 def _too_many(site: SitePlacement, what: str) -> BlastEnvError:
@@ -283,7 +283,7 @@ def _polygons(kept: Sequence[Thing]) -> list[tuple[Footprint, ...]]:
     for digits in _DIGITS:
         polygons = [_footprints(part, digits) for part in apart]
         levels = (
-            [own for own, item in zip(polygons, kept, strict=True) if item.carries == carries]
+            [own for own, thing in zip(polygons, kept, strict=True) if thing.carries == carries]
             for carries in (False, True)
         )
         if not any(map(_overlap, levels)):
@@ -312,7 +312,7 @@ def _footprints(outline: BaseGeometry, digits: int) -> tuple[Footprint, ...]:
                 if shapely.Polygon(ring).area >= _LEAST_PART_M2
             ]
             found.append(footprint_of(rings[0], tuple(rings[1:])))
-    return tuple(item for item in found if item.cells)
+    return tuple(footprint for footprint in found if footprint.cells)
 
 
 def _overlap(buildings: Iterable[Sequence[Footprint]]) -> bool:
@@ -402,9 +402,9 @@ def _nearest(
     """Return the index of the building nearest to a place of the map."""
     x_m, y_m = site.to_site(np.array([place]))[0]
     point = shapely.Point(x_m, y_m)
-    distances_m = [thing.outline.distance(point) for thing in buildings]
-    best, known = int(np.argmin(distances_m)), {thing.place for thing in buildings}
-    reasons = {thing.place: thing.kind for thing in site.ledger.of(Fate.LEFT_OUT)}
+    distances_m = [building.outline.distance(point) for building in buildings]
+    best, known = int(np.argmin(distances_m)), {building.place for building in buildings}
+    reasons = {entry.place: entry.kind for entry in site.ledger.of(Fate.LEFT_OUT)}
     reasons = {key: reason for key, reason in reasons.items() if key not in known}
     for thing in (*site.of_role(Role.BUILDING), *site.faulty):
         if thing.place not in reasons or thing.role is not Role.BUILDING or thing.geometry.is_empty:
@@ -427,10 +427,10 @@ def _listed(buildings: Sequence[BuildingFit]) -> str:
     """Return the names of some buildings, those with names on the map first."""
     titled = sorted(buildings, key=lambda building: not building.title)
     shown = [
-        name.name
-        if "_".join(name.title.split()) in ("", name.name)
-        else f"{name.name} ({named(name.title)})"
-        for name in titled[:_MOST_LISTED]
+        building.name
+        if "_".join(building.title.split()) in ("", building.name)
+        else f"{building.name} ({named(building.title)})"
+        for building in titled[:_MOST_LISTED]
     ]
     more = len(buildings) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more else "")

@@ -223,8 +223,8 @@ def build_zone(site: SitePlacement, buildings: Sequence[BuildingFit]) -> dict[st
         cut = Rectangle(*shapely.intersection(shapely.box(*around), site.box).bounds)
         inside[_window(site, cut, "--zone-around")] = True
     elif site.of_role(Role.ZONE):
-        for item in _on_site(site, Role.ZONE):
-            inside |= cells_of(item.geometry, site.shape)
+        for thing in _on_site(site, Role.ZONE):
+            inside |= cells_of(thing.geometry, site.shape)
     elif options.zone_from:
         raise BlastEnvError(
             f"{site.path}: nothing on the site is chosen by --zone-from {options.zone_from}"
@@ -254,11 +254,11 @@ def _keep_outs(
     reach_m = 0.5 * MODULE_SIDE_M - _TOUCHED_M
     areas = [
         (
-            (item.name or "no-build area of the map")[:_MOST_REASON],
-            item.geometry.buffer(reach_m, join_style="mitre"),
+            (thing.name or "no-build area of the map")[:_MOST_REASON],
+            thing.geometry.buffer(reach_m, join_style="mitre"),
         )
-        for item in _on_site(site, Role.KEEP_OUT)
-        if item.geometry.area
+        for thing in _on_site(site, Role.KEEP_OUT)
+        if thing.geometry.area
     ]
     first = window[0].start, window[1].start
     for side in _COARSER:
@@ -315,7 +315,7 @@ def _window(site: SitePlacement, area_m: Rectangle, option: str) -> tuple[slice,
             f"{option} is x {left:g} to {right:g} m, y {bottom:g} to {top:g} m, must lie on the "
             f"site (x 0 to {width_m:g} m, y 0 to {height_m:g} m)"
         )
-    left, bottom, right, top = (round(rectangle / MODULE_SIDE_M) for rectangle in area_m)
+    left, bottom, right, top = (round(side_m / MODULE_SIDE_M) for side_m in area_m)
     return slice(bottom, max(top, bottom + 1)), slice(left, max(right, left + 1))
 
 
@@ -325,7 +325,7 @@ def cells_of(outline: BaseGeometry, shape: tuple[int, int]) -> BoolArray:
     if not outline.area:
         return cells
     bounds = np.array(outline.bounds) / MODULE_SIDE_M
-    left, bottom, right, top = (max(int(item), 0) for item in (*bounds[:2], *np.ceil(bounds[2:])))
+    left, bottom, right, top = (max(int(bound), 0) for bound in (*bounds[:2], *np.ceil(bounds[2:])))
     window = cells[bottom:top, left:right]
     rows, columns = window.shape
     x_m = MODULE_SIDE_M * (left + np.arange(columns) + 0.5)

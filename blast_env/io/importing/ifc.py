@@ -73,8 +73,8 @@ def read_ifc(site_map: SiteMap) -> None:
 def _units(model: Any) -> list[Any]:
     """Return the named units of a project."""
     assigned = [project.UnitsInContext for project in model.by_type("IfcProject")]
-    units = [unit for item in assigned if item is not None for unit in item.Units or ()]
-    return [item for item in units if item.is_a("IfcNamedUnit")]
+    units = [unit for chosen in assigned if chosen is not None for unit in chosen.Units or ()]
+    return [unit for unit in units if unit.is_a("IfcNamedUnit")]
 
 
 def _note_place(model: Any, ledger: Ledger, name: str) -> None:
@@ -142,7 +142,7 @@ class _Model:
 
     def _solids(self, elements: list[Any]) -> Iterator[Solid]:
         """Yield the elements that have a shape."""
-        elements = [item for item in elements if item.Representation]
+        elements = [element for element in elements if element.Representation]
         if not elements:
             return
         settings = ifcopenshell.geom.settings()

@@ -310,7 +310,7 @@ class Building:
     def _floors_m(self) -> list[float]:
         """Heights of the storeys on which windows stand, or that have a slab."""
         tops_m = [wall.high_m for wall in self._walls if wall.element.is_a("IfcSlab")]
-        used = {self._floor_m(wall) for own in self._windows.values() for wall in own}
+        used = {self._floor_m(window) for own in self._windows.values() for window in own}
         slabs = {
             floor_m
             for floor_m in self.storeys_m.values()
@@ -367,7 +367,7 @@ def _is_curtain(solid: Solid) -> bool:
     ]
     return bool(solid.element.is_a("IfcPlate")) and (
         getattr(solid.element, "PredefinedType", None) == "CURTAIN_PANEL"
-        or any(storey_m.is_a("IfcCurtainWall") for storey_m in above)
+        or any(whole.is_a("IfcCurtainWall") for whole in above)
     )
 
 

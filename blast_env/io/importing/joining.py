@@ -93,7 +93,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     # 4. An entry in the ledger for each line, with the gap that was bridged.
     bridged_m = np.zeros(len(lines))
     np.maximum.at(bridged_m, owners, gaps_m)
-    chiefs = {group.place for group in found}
+    chiefs = {outline.place for outline in found}
     for k, outline in used.items():
         words = f", {1000.0 * bridged_m[k]:.1f} mm bridged" if bridged_m[k] > _ROUNDING_M else ""
         own = lines[k]
@@ -164,17 +164,17 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
             gone.add(outlines[low])
     # 3. Outlines by depth: those within an odd number of others are courts of the smallest, those
     # within an even number are buildings that stand in a court.
-    for low, around in sorted(deep.items(), key=lambda item: len(item[1])):
+    for low, around in sorted(deep.items(), key=lambda pair: len(pair[1])):
         court = things[outlines[low]]
         if outlines[low] in gone:
             continue
         if len(around) % 2 == 0 or court.name or len(texts.query(court.geometry, "contains")):
             continue
-        high = outlines[min(around, key=lambda item: areas[item])]
+        high = outlines[min(around, key=lambda index: areas[index])]
         hole = shapely.difference(found[high].geometry, court.geometry)
         found[high] = replace(found[high], geometry=hole)
         kind, detail = "outlines within outlines, taken as courtyards", found[high].place
         ledger.add(Fate.GUESSED, kind, court.place, court.name, f"of {detail}")
         ledger.add(Fate.MERGED, "courtyards", court.place, court.name, f"with {detail}")
         gone.add(outlines[low])
-    return [group for k, group in enumerate(found) if k not in gone]
+    return [thing for k, thing in enumerate(found) if k not in gone]

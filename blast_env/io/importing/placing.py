@@ -125,11 +125,9 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> SitePlacement:
     near = closed(_near(site_map, things, plane), ledger)
     if site_map.has_layers:
         near = with_courtyards(near, ledger)
-    open_lines = [street for street in near if street.fault]
-    near = [street for street in near if not street.fault]
-    if not near or (
-        options.size_m is None and Role.BUILDING not in {street.role for street in near}
-    ):
+    open_lines = [thing for thing in near if thing.fault]
+    near = [thing for thing in near if not thing.fault]
+    if not near or (options.size_m is None and Role.BUILDING not in {thing.role for thing in near}):
         raise _nothing(site_map, [*faulty, *open_lines])
     rotation_deg = _rotation_deg(near, options)
     turned = _moved(near, lambda places: rotated(places, -rotation_deg))
@@ -203,7 +201,7 @@ def _near(site_map: SiteMap, things: Sequence[Thing], plane: Plane) -> list[Thin
     """Return the objects that may lie on the site, in metres of the plane."""
     options = site_map.options
     measured = _moved(things, plane.to_metres)
-    geometries = [street.geometry for street in measured]
+    geometries = [thing.geometry for thing in measured]
     reference = options.origin or options.centre
     if options.size_m is None or reference is None:
         if not np.isfinite(shapely.bounds(geometries)).all():

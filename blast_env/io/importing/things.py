@@ -206,10 +206,14 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
         BlastEnvError: If a selector chooses nothing.
     """
     selectors, reader = _selectors(site_map), HeightReader.of(site_map)
-    roles = [_role(item, selectors, site_map) for item in site_map.features]
+    roles = [_role(feature, selectors, site_map) for feature in site_map.features]
     known = ("kind", "highway", "layer", *_BUILDING_KEYS)
-    if not selectors and not any(key in item.tags for item in site_map.features for key in known):
-        roles = [Role.BUILDING if _may_be_building(item) else None for item in site_map.features]
+    if not selectors and not any(
+        key in feature.tags for feature in site_map.features for key in known
+    ):
+        roles = [
+            Role.BUILDING if _may_be_building(feature) else None for feature in site_map.features
+        ]
     wholes = {
         str(feature.tags["id"]): feature.place
         for feature, role in zip(site_map.features, roles, strict=True)
