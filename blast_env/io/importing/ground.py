@@ -73,6 +73,8 @@ def charge_sources(
         BlastEnvError: If there is no place for a charge, or there are too many.
     """
     free = _free(site, buildings, radius_m)
+    # 1. Places asked for, and the mouths of passages; 2. streets and areas, in coarser lines until
+    # they are few enough; 3. if not even then, streets by their centre lines.
     asked, mouths = list(_asked(site, free)), mouths_of(site, buildings, free)
     things, most = _on_site(site, Role.CHARGE), MOST_SOURCES - len(asked)
     sources, has_kerbs = _fewest(site, things, free, mouths, most), True
@@ -177,6 +179,7 @@ def _sources(
 def _segments(
     line: BaseGeometry, free: BaseGeometry, tolerance_m: float
 ) -> Iterator[dict[str, Any]]:
+    # Straight pieces, less what is too near to buildings or the border; crumbs are dropped.
     places = shapely.get_coordinates(shapely.simplify(line, tolerance_m))
     pieces = shapely.linestrings(np.stack((places[:-1], places[1:]), axis=1))
     parts = shapely.get_parts(shapely.intersection(pieces, free))
@@ -233,6 +236,7 @@ def build_zone(site: SitePlacement, buildings: Sequence[BuildingFit]) -> dict[st
         return None
     if not inside.any():
         raise BlastEnvError(f"{site.path}: the build zone is not on the site")
+    # A zone is a rectangle: the bounding box, with no-build areas where the wanted area is not.
     rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
     low_row, left_column = int(rows[0]), int(columns[0])
     window = slice(low_row, int(rows[-1]) + 1), slice(left_column, int(columns[-1]) + 1)
@@ -260,6 +264,7 @@ def _keep_outs(
         for thing in _on_site(site, Role.KEEP_OUT)
         if thing.geometry.area
     ]
+    # Larger and larger blocks, each closed if any of it is: the zone only ever gets smaller.
     first = window[0].start, window[1].start
     for side in _COARSER:
         touched = ((reason, cells_of(area, site.shape)[window]) for reason, area in areas)

@@ -237,6 +237,7 @@ class Building:
         walls = self._walls
         if not walls:
             return "where it is placed", self.placed_m
+        # What the model says comes first, if it is possible; then what its elements say.
         low_m = min(solid.low_m for solid in self.solids)
         top_m = max(wall.high_m for wall in walls)
         candidates = [("where it is placed", self.placed_m), *self.stated_m]
@@ -255,6 +256,7 @@ class Building:
         if not walls or max(wall.high_m for wall in walls) <= self.ground_m + LEAST_STOREY_M:
             return []
         limit_m = self.ground_m + LEAST_STOREY_M
+        # The plan of what stands on the ground closes the outline where walls have gaps.
         feet = [solid for solid in self.solids if solid.low_m <= limit_m < solid.high_m]
         plans = [plan for solid in feet for plan in solid.feet]
         faces = Faces.joined(wall.faces for wall in walls)
@@ -287,6 +289,7 @@ class Building:
             ]
             if not around or _is_in_roof(solid):
                 continue
+            # What walls enclose is costly to find: once for all windows of a height.
             key = round(height_m, 1)
             if key not in insides:
                 insides[key] = self._inside(height_m, around)
@@ -333,6 +336,8 @@ class Building:
         """Return the storeys and windows of a part; empty without windows."""
         if not windows:
             return {}
+        # 1. Storeys, from the underside up; 2. the largest pane stands for all, as it breaks first;
+        # 3. its sill above the floor below it; 4. bays as wide as windows are apart on the outline.
         floors_m = [part.base_m]
         for floor_m in self._floors_m:
             if floor_m - floors_m[-1] >= _STOREY_M and floor_m <= part.top_m - LEAST_STOREY_M:

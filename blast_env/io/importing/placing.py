@@ -121,6 +121,8 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> SitePlacement:
     things = [thing for thing in things if not thing.fault]
     if not things:
         raise _nothing(site_map, faulty)
+    # 1. A plane in metres around the site; 2. lines that close, and courtyards; 3. the direction of
+    # most walls; 4. a grid along it, whose lines follow the walls as well as they can.
     plane = plane_around(site_map.crs, site_map.unit_m, _reference(things, options))
     near = closed(_near(site_map, things, plane), ledger)
     if site_map.has_layers:
@@ -261,6 +263,7 @@ def _grid(
             f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
         )
     box = shapely.box(left, bottom, right, top)
+    # The offset at which most walls lie on grid lines, so that modules keep their outlines.
     own = [thing.geometry for thing in things if thing.role is Role.SITE]
     buildings = np.array([thing.geometry for thing in things if thing.role is Role.BUILDING])
     offsets_m = grid_offset_m(own or buildings[shapely.intersects(buildings, box)].tolist())
@@ -306,6 +309,7 @@ def _margin_m(site_map: SiteMap, things: Sequence[Thing], bounds_m: FloatArray) 
     streets = [thing for thing in things if thing.role is Role.CHARGE]
     if site_map.options.charge_at or not streets or not all(street.is_line for street in streets):
         return MARGIN_M
+    # Metre by metre outwards, until a street has enough of its length on the site.
     lines = [shapely.union_all(list(street.kerbs)) for street in streets]
     for margin_m in np.arange(MARGIN_M, MOST_MARGIN_M + 1.0):
         inside_m = margin_m - _TO_BORDER_M

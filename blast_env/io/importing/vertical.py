@@ -80,6 +80,7 @@ class _Places:
         self._things, self._level_m = things, level_m
         self._tree = shapely.STRtree([thing.geometry for thing in things])
         self._below = [self._support(k) for k in range(len(things))]
+        # The zero of a file means the ground if anything that stands alone is near it.
         roots = [
             thing
             for thing, below in zip(things, self._below, strict=True)
@@ -90,6 +91,7 @@ class _Places:
     def grounds(self) -> list[tuple[float, str]]:
         """Return the height of the ground under each building, and what the ledger says of it."""
         found: dict[int, tuple[float, str]] = {}
+        # From below: a building has the ground of the one that it stands on.
         for k in sorted(range(len(self._things)), key=lambda k: self._things[k].base_m):
             found[k] = self._ground(k, found)
         return [found[k] for k in range(len(self._things))]
@@ -100,18 +102,22 @@ class _Places:
         if below is not None:
             ground_m, kind = lower[below]
             return ground_m, kind if kind == _GROUND else ""
+        # It stands on no other. 1. Near the zero of its file: on the ground.
         thing = self._things[k]
         base_m, height_m = thing.base_m, self._top_m(thing)
         if self._is_near_zero(thing) if thing.has_z else base_m <= self._level_m:
             return 0.0, ""
         if height_m <= 0.0:
             return (0.0, "") if self._has_zero else (base_m, _GROUND)
+        # 2. Carried at its side, or by posts: in the air.
         is_tag = not thing.has_z
         beside = self._beside(k)
         if beside is not None:
             return (0.0 if is_tag else lower[beside][0]), _IN_AIR
         if is_tag and thing.kind in _ON_POSTS and base_m <= _MOST_STOREYS * self._level_m:
             return 0.0, ""
+        # 3. A roof without walls, or storeys that are missing below: in the air. 4. Else the ground
+        # is higher there.
         is_thin = height_m - base_m < LEAST_STOREY_M
         if (self._has_zero and is_thin) or (is_tag and base_m <= _MOST_STOREYS * self._level_m):
             return 0.0, _IN_AIR
