@@ -96,9 +96,9 @@ def _facade_problems(scenario: Content) -> Iterator[Problem]:
     """Check facades and the measures that harden them, if the sections that they use are valid."""
     problems = list(facade_problems(scenario.structures, scenario.components))
     yield from problems
-    if scenario.build_zone is not None and not problems:
-        measures = scenario.build_zone.hardening
-        yield from hardening_problems(scenario.structures, scenario.components, measures)
+    zone = scenario.build_zone
+    if zone is not None and zone.hardening and not problems:
+        yield from hardening_problems(scenario.structures, scenario.components, zone.hardening)
 
 
 def _removable_problems(scenario: Content) -> Iterator[Problem]:

@@ -163,11 +163,11 @@ def facade_problems(structures: Iterable[AnyStructure], own: Components) -> Iter
         structures: The structures.
         own: The components that the scenario defines.
     """
-    known = {**catalogue(), **own}
     for index, structure in enumerate(structures):
         facade = structure.facade
         if facade is None:
             continue
+        known = {**catalogue(), **own}  # here, because sites without facades do without it
         where = f"structures[{index}].facade"
         if structure.height_m is None:
             yield Problem(where, "needs the structure's height_m: bays are storeys high")
