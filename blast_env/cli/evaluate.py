@@ -102,7 +102,7 @@ def evaluate(
         drawn = range(first_seed, first_seed + seeds)
     with running_on(cluster), resumable(resume_words(cache)):
         site = load_scenario(scenario)
-        elements = sorted(load_layout(layout, site))
+        elements, provenance = sorted(load_layout(layout, site)), LayoutFile.load(layout).provenance
         used = final_engine(engine, [site], cell_m, cells)
         case = LoadCaseSet(site, given.drawn_by(site, drawn, used))
         if export is not None:
@@ -120,7 +120,6 @@ def evaluate(
                 cvar_level=cvar_level,
                 progress=progress,
             )
-    provenance = LayoutFile.load(layout).provenance
     preset = site.simulation.preset if used.needs_calibration else None
     record = {**found.to_dict(), "preset": preset, "provenance": provenance}
     written = [] if out is None else _write(found, record, out)

@@ -68,6 +68,22 @@ def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -
     assert "(cells)" not in table.stdout
 
 
+def test_a_layout_file_may_go_while_blasts_run(
+    layout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it is read before the first blast, so that no result is lost."""
+    advance = EventRun.advance
+
+    def gone(run: EventRun, until_s: float) -> None:
+        layout.unlink(missing_ok=True)
+        advance(run, until_s)
+
+    monkeypatch.setattr(EventRun, "advance", gone)
+    result = evaluate("--layout", layout, "--seeds", "1")
+    assert result.exit_code == 0, result.output
+    assert not layout.exists()
+
+
 def test_the_next_run_finds_the_blasts_that_the_first_one_kept(
     layout: Path, tmp_path: Path
 ) -> None:
