@@ -52,7 +52,7 @@ from blast_env.design.search import (
     layouts_by_rule,
     proposers,
 )
-from blast_env.design.search.by_rule import DEFAULT_BUDGET
+from blast_env.design.search.by_rule import DEFAULT_BUDGET, ProposerKind
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.registry import check_suits, proposer_row
 from blast_env.envs.episode import find_risk
@@ -234,12 +234,13 @@ def _method(
 
 def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> SearchRun:
     scenario, evaluator = problem.scenario, problem.evaluator
-    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
-    engine, turns = evaluator.engine, islice(cycle(problem.threats), budget)
+    is_rule = proposer_row(method.name).kind is ProposerKind.RULE  # which spends no blast
+    engine, turns = evaluator.engine, islice(cycle(problem.threats), 0 if is_rule else budget)
     costs = (engine.cost(scenario, turn.charge) for turn in turns)
-    hits, begun_s = evaluator.counts.cache_hits, perf_counter()
     label = f"{method.name} search in {scenario.name}"
     with blasts_running(label, engine.describe([scenario]), costs) as progress:
+        problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+        hits, begun_s = evaluator.counts.cache_hits, perf_counter()
 
         def report(state: Progress) -> None:
             best = "" if state.best is None else percent(state.best.reduction(problem))

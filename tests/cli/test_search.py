@@ -97,10 +97,11 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
 
 def test_a_rule_spends_nothing(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    options = ("--scenario", site, "--held-out", 2, "--out", out)
+    options = ("--scenario", site, "--engine", "gas", "--out", out)
     result = search("--method", "wall_near_charge", *options)
     assert result.exit_code == 0, result.output
     assert "0 of 200 blasts spent" in result.stdout
+    assert "blasts of gas" not in result.stdout  # no estimate of a cost that there is not
     assert sorted(path.name for path in out.iterdir()) == ["layout.json", "layout.png"]
 
 
