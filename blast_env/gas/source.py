@@ -333,11 +333,14 @@ def lay(
         volume: (nx, ny, nz), (3, nx, ny, nz), (nx, ny, nz) and (nx, ny, nz). Solid cells hold
         still air.
     """
+    # 1. More points in each cell the nearer the front is, in powers of two, which divide exactly.
     wanted = _SAMPLES_PER_RADIUS * grid.cell_m / profile.front_m
     samples = 2 ** ceil(log2(min(max(wanted, _LEAST_SAMPLES), _MOST_SAMPLES)))
     centre = _centre(charge)
     still = np.array([AIR_DENSITY_KG_M3, 0.0, AIR_PRESSURE_PA / (GAMMA - 1.0), 0.0])
     excess = profile.state - still[:, None]
+    # 2. The cells within the front; 3. what the blast adds there to still air, and what the ground
+    # reflects: a second blast from the mirror image of a charge above it.
     middle = (np.array(centre) - np.array(grid.origin_m)) / grid.cell_m
     front = profile.front_m / grid.cell_m
     low = np.maximum(np.floor(middle - front), 0.0).astype(np.int64)
@@ -412,6 +415,7 @@ class _Profiles:
     def _now(self) -> RadialProfile:
         blast = self._blast
         state = blast.state.copy()
+        # The products burn on, with a time constant that scales as all times do: what is left.
         state[PRODUCTS] *= exp(-blast.time_s / self._later_s)
         return RadialProfile(blast.time_s, blast.front_m, blast.shell_m, state)
 
@@ -440,6 +444,7 @@ def _lay(
     halves = np.empty((8, 6))
     for a, b, c in np.ndindex(solid.shape):
         i, j, k = a + low[0], b + low[1], c + low[2]
+        # The point of the cell that is nearest to the centre: beyond the front, the air is still.
         x = max(i - place[0], place[0] - i - 1.0, 0.0)
         y = max(j - place[1], place[1] - j - 1.0, 0.0)
         z = max(k - place[2], place[2] - k - 1.0, 0.0)
@@ -488,6 +493,7 @@ def _add_side(
                 if dz * toward_z < 0.0 or (dz == 0.0 and toward_z < 0.0):
                     continue
                 distance = sqrt(dx * dx + dy * dy + dz * dz)
+                # Linear between the middles of shells; momentum points away from the centre.
                 at = max(distance / shell - 0.5, 0.0)
                 low = int(at)
                 if low >= last:

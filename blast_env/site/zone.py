@@ -368,6 +368,7 @@ class EmptyZone:
         Returns:
             Shape (..., variants, rows, columns).
         """
+        # A piece stands on one level: places on each of them, as if the others were taken.
         if len(self.levels):
             flat = replace(self, levels=self.levels[:0])
             anywhere: BoolArray = np.any([flat.places(free & own) for own in self.levels], axis=0)
@@ -376,6 +377,8 @@ class EmptyZone:
         if len(variants) == 1 and variants[0].rows == variants[0].columns == 1:
             return free[..., np.newaxis, :, :]  # the usual case
         *many, rows, columns = free.shape
+        # A window is free if the counts at its corners cancel (summed-area table, Crow 1984); items
+        # of one size have the same windows.
         places = np.zeros((*many, len(variants), rows, columns), dtype=bool)
         taken = counts_before(~free)
         windows: dict[tuple[int, int], BoolArray] = {}
@@ -405,6 +408,7 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     module_costs = _module_costs(zone, boxes)
     catalogue = zone.catalogue
     costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
+    # Where pieces fit follows from the zone itself: first without, then with the answer.
     cells = EmptyZone(
         catalogue, usable, passable, ground, levels, module_costs, usable[np.newaxis], costs
     )
