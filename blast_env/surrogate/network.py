@@ -351,21 +351,32 @@ class Surrogate:
         Raises:
             BlastEnvError: If the surrogate has no intervals.
         """
-        chosen = np.atleast_1d(which)[:, np.newaxis]
+        return self._moved(guess, np.atleast_1d(which)[:, np.newaxis].astype(float))
 
-        def upper(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
+    def lower_ends(self, guess: Guess) -> Guess:
+        """Return predicted loads at the lower ends of their 95 % intervals.
+
+        Raises:
+            BlastEnvError: If the surrogate has no intervals.
+        """
+        return self._moved(guess, np.array(-1.0))
+
+    def _moved(self, guess: Guess, half_widths: FloatArray) -> Guess:
+        """Return predicted loads moved by numbers of half-widths of their intervals."""
+
+        def moved(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
             if check is None:
                 raise BlastEnvError(
                     "this surrogate has no intervals: `python -m studies.surrogate calibrate` adds "
                     "them"
                 )
-            found: FloatArray = loads * np.exp(check.spreads * spread * chosen)
+            found: FloatArray = loads * np.exp(check.spreads * spread * half_widths)
             return found
 
-        impulse_pa_s = upper(guess.impulse_pa_s, guess.spread, self.fit.impulse)
+        impulse_pa_s = moved(guess.impulse_pa_s, guess.spread, self.fit.impulse)
         if guess.peak_pa is None or guess.peak_spread is None:
             return guess._replace(impulse_pa_s=impulse_pa_s)
-        peak_pa = upper(guess.peak_pa, guess.peak_spread, self.fit.peak)
+        peak_pa = moved(guess.peak_pa, guess.peak_spread, self.fit.peak)
         return guess._replace(impulse_pa_s=impulse_pa_s, peak_pa=peak_pa)
 
     def save(self, path: str | Path) -> Path:
