@@ -46,7 +46,9 @@ MATRIX_PYTHON = out/matrix/$*/bin/python
 # and other numbers of threads. tests/digests.py says what a digest depends on.
 ROUNDING := default avx2 avx512 generic kernels no-fma one-thread four-threads
 ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents design gas response studies test_gas.py)
-matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%)
+# The doors to agents, each with the extra that it needs; they cannot be installed together.
+DOORS := mcp openenv
+matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%) $(DOORS:%=matrix-%)
 
 matrix-default matrix-avx2 matrix-avx512: export ATEN_CPU_CAPABILITY = $(@:matrix-%=%)
 matrix-generic: export NUMBA_CPU_NAME := generic
@@ -63,6 +65,13 @@ matrix-one-thread matrix-four-threads: export OPENBLAS_NUM_THREADS = $(THREADS)
 matrix-one-thread matrix-four-threads: export NUMBA_NUM_THREADS = $(THREADS)
 $(ROUNDING:%=matrix-%): matrix-%: $(STAMP)
 	$(BIN)/pytest --numprocesses auto --dist worksteal -rs $(ROUNDING_TESTS)
+
+$(DOORS:%=matrix-%): matrix-%: $(VENV)/.uv
+	mkdir -p out/matrix
+	$(BIN)/uv venv --quiet --clear --python $(PYTHON) out/matrix/$*
+	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) -e ".[$*,render]" -c constraints.txt
+	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) $(MATRIX_TOOLS)
+	$(MATRIX_PYTHON) -m pytest --numprocesses auto -rs tests/tools
 
 matrix-%: $(VENV)/.uv
 	mkdir -p out/matrix

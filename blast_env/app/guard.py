@@ -9,6 +9,7 @@ import asyncio
 import html
 import re
 import secrets
+import socket
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -40,7 +41,8 @@ _TOKEN_BYTES: Final = 32
 _EVERYWHERE: Final = ("0.0.0.0", "::", "")
 _OWN_NAMES: Final = ("localhost", "127.0.0.1", "[::1]")
 _NAME: Final = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_-]+(\.[a-z0-9_-]+)*)(:[0-9]{1,5})?")
-_METHODS: Final = ("GET", "HEAD", "POST")
+METHODS: Final = ("GET", "HEAD", "POST")
+"""Methods of the requests of a page."""
 
 _POLICY: Final = MappingProxyType(
     {
@@ -130,6 +132,24 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host.lower()
 
 
+def check_port(host: str, port: int) -> None:
+    """Refuse an unusable port, before anything is started.
+
+    Raises:
+        BlastEnvError: If it is in use, or may not be used.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise BlastEnvError(
+                f"port {port} of {host} cannot be used: {reason}; name another one (--port)"
+            ) from error
+
+
 class Guard:
     """ASGI middleware that admits only allowed requests and websockets to an application.
 
@@ -138,6 +158,7 @@ class Guard:
         entrance: The address of the page, and its secret.
         most_bytes: Largest request.
         most_s: Longest time that a request with content may take.
+        methods: Methods of requests.
     """
 
     def __init__(
@@ -146,12 +167,14 @@ class Guard:
         entrance: Entrance,
         most_bytes: int = MOST_BYTES,
         most_s: float = MOST_SECONDS,
+        methods: tuple[str, ...] = METHODS,
     ) -> None:
         self.app = app
         self._entrance = entrance
         self._authorities = entrance.authorities
         self._most_bytes = most_bytes
         self._most_s = most_s
+        self._methods = methods
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or refuse it."""
@@ -180,8 +203,8 @@ class Guard:
         method = asked.scope["method"]
         if reason:
             return _refused(403, reason)
-        if method not in _METHODS:
-            return _refused(405, f"method {method} is none of {', '.join(_METHODS)}")
+        if method not in self._methods:
+            return _refused(405, f"method {method} is none of {', '.join(self._methods)}")
         given = asked.query_params.get(TOKEN)
         if method == "GET" and given is not None and self._is_token(given):
             return self._welcome(asked)
@@ -214,7 +237,11 @@ class Guard:
         return ""
 
     def _is_known(self, asked: HTTPConnection) -> bool:
-        return self._is_token(asked.cookies.get(self._entrance.cookie, ""))
+        """Return whether a browser has the cookie, or another program the token as bearer."""
+        bearer = asked.headers.get("authorization", "").removeprefix("Bearer ")
+        return self._is_token(asked.cookies.get(self._entrance.cookie, "")) or self._is_token(
+            bearer
+        )
 
     def _is_token(self, given: str) -> bool:
         return secrets.compare_digest(given.encode(), self._entrance.token.encode())
@@ -280,6 +307,38 @@ class Guard:
                 raise
 
 
+class PathGuard:
+    """ASGI middleware that admits programs, not pages, under a path that begins with the token.
+
+    It is for clients that can be given an address, but no header.
+
+    Args:
+        app: The application, which sees paths without the token.
+        entrance: The address, and its secret.
+    """
+
+    def __init__(self, app: ASGIApp, entrance: Entrance) -> None:
+        self.app = app
+        self._entrance = entrance
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        asked = HTTPConnection(scope)
+        hosts = asked.headers.getlist("host")
+        token, _, path = scope["path"].removeprefix("/").partition("/")
+        is_own = len(hosts) == 1 and hosts[0].lower() in self._entrance.authorities
+        known = secrets.compare_digest(token.encode(), self._entrance.token.encode())
+        if is_own and known and "origin" not in asked.headers:
+            await self.app({**scope, "path": f"/{path}", "raw_path": b""}, receive, send)
+        elif scope["type"] == "websocket":
+            await WebSocketClose(code=1008, reason=_WITHOUT_TOKEN)(scope, receive, send)
+        else:
+            await _refused(403, _WITHOUT_TOKEN)(scope, receive, send)
+
+
 async def _is_gone(receive: Receive) -> bool:
     """Return whether the browser has hung up."""
     with suppress(TimeoutError):
@@ -291,7 +350,7 @@ async def _is_gone(receive: Receive) -> bool:
 
 
 _WITHOUT_TOKEN: Final = (
-    "this page is opened by the address that `blast-env app` printed, with its token"
+    "this is opened by the address that `blast-env app` or `serve` printed, with its token"
 )
 
 

@@ -1,13 +1,12 @@
 """The server of the page, for one person at a desk."""
 
-import socket
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 from blast_env.app.folder import WorkFolder
-from blast_env.app.guard import Entrance, Guard
+from blast_env.app.guard import Entrance, Guard, check_port
 from blast_env.app.jobs import Workers
 from blast_env.app.kept import check_key
 from blast_env.app.session import Sessions
@@ -104,24 +103,6 @@ def _say(_: Request, error: Exception) -> PlainTextResponse:
 def _style() -> None:
     ui.colors(primary=_PRIMARY)
     ui.add_css((_PAGE_FILES / "page.css").read_text(encoding="utf-8"))
-
-
-def check_port(host: str, port: int) -> None:
-    """Refuse an unusable port, before anything is started.
-
-    Raises:
-        BlastEnvError: If it is in use, or may not be used.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise BlastEnvError(
-                f"port {port} of {host} cannot be used: {reason}; name another one (--port)"
-            ) from error
 
 
 def serve(entrance: Entrance, folder: Path) -> None:

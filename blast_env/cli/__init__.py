@@ -31,6 +31,7 @@ class _Commands(LazyGroup):
             "Open a local web page to design on: draw a site, place barriers, blast, compare, "
             "search."
         ),
+        "serve": "Serve problems to agents as tools, by MCP or OpenEnv.",
     }
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 

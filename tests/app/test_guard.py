@@ -134,7 +134,7 @@ def test_nothing_is_given_without_the_token(path: str) -> None:
     for given in ("", "?token=", "?token=wrong", f"?token={ENTRANCE.token}x"):
         answer = Browser(known=False).get(path + given)
         assert answer.status_code == 403
-        assert "address that `blast-env app` printed" in answer.text
+        assert "address that `blast-env app` or `serve` printed" in answer.text
     answer = Browser(known=False).ask("POST", f"{path}?token={ENTRANCE.token}", OWN)
     assert answer.status_code == 403
     wrong = Browser(known=False)

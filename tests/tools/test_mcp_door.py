@@ -1,0 +1,148 @@
+"""The door by MCP, with the package's own client: in memory, by standard input, and by HTTP."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+mcp = pytest.importorskip("mcp", reason="needs the extra mcp: `make matrix-mcp`")
+
+import anyio  # noqa: E402
+import httpx2  # noqa: E402  # comes with mcp
+from mcp.client.stdio import StdioServerParameters  # noqa: E402
+from mcp.client.streamable_http import streamable_http_client  # noqa: E402
+
+from blast_env.tools import TOOLS, Episode, Sessions  # noqa: E402
+from blast_env.tools.mcp_door import mcp_server  # noqa: E402
+from blast_env.tools.scripts import played_in, rules_guesses_blasts  # noqa: E402
+from tests.tools.row_session import BEST, session, walls  # noqa: E402
+
+
+def sessions() -> Sessions:
+    return Sessions(lambda episode: session(episode.seed, episode.budget), Episode(budget=3))
+
+
+async def values(client: Any, name: str, **arguments: Any) -> dict[str, Any]:
+    """Call a tool, and check that text and structure agree."""
+    result = await client.call_tool(name, arguments)
+    assert not result.is_error, result.content
+    found: dict[str, Any] = result.structured_content
+    assert json.loads(result.content[0].text) == found
+    return found
+
+
+async def play(client: Any, **more: Any) -> float:
+    script = rules_guesses_blasts()
+    asked = next(script)
+    while True:
+        try:
+            asked = script.send(await values(client, asked[0], **asked[1], **more))
+        except StopIteration as end:
+            return end.value
+
+
+def within(work: Any) -> Any:
+    """Run a coroutine, no longer than a client waits."""
+
+    async def limited() -> Any:
+        with anyio.fail_after(120.0):
+            return await work()
+
+    return anyio.run(limited)
+
+
+def test_a_script_gets_the_score_that_python_gets() -> None:
+    async def work() -> float:
+        async with mcp.Client(mcp_server(sessions())) as client:
+            listed = {tool.name: tool for tool in (await client.list_tools()).tools}
+            assert set(listed) == {"begin", *TOOLS}
+            assert listed["look"].output_schema == TOOLS["look"].result_schema
+            return await play(client)
+
+    assert within(work) == played_in(rules_guesses_blasts(), session()) > 0.0
+
+
+def test_full_zero_malformed_and_reseeded() -> None:
+    """The fixtures that others ask for, each in a session of its own."""
+
+    async def work() -> None:
+        async with mcp.Client(mcp_server(sessions())) as client:
+            seen = []
+            for seed, layout, score in ((0, walls(*BEST), 1.0), (0, [], 0.0), (1, [], 0.0)):
+                own = (await values(client, "begin", seed=seed))["session"]
+                seen.append((await values(client, "rules", session=own))["proposals"])
+                found = await values(client, "submit", layout=layout, session=own)
+                assert found["score"]["score"] == score
+                ended = await client.call_tool("look", {"session": own})
+                assert ended.is_error
+                assert "begin another session" in ended.content[0].text
+            assert seen[0] == seen[1] != seen[2]
+            for name, wrong, words in (
+                ("submit", {}, "layout is missing"),
+                ("submit", {"layout": "all"}, "layout is 'all'"),
+                ("look", {"session": "else"}, "no session 'else'"),
+                ("dig", {}, "no tool 'dig'"),
+            ):
+                refused = await client.call_tool(name, wrong)
+                assert refused.is_error
+                assert words in refused.content[0].text
+            picture = await client.call_tool("look", {"picture": True})
+            assert [block.type for block in picture.content] == ["text", "image"]
+
+    within(work)
+
+
+COMMAND = [sys.executable, "-m", "blast_env", "serve", "--mcp", "--budget", "0"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+def test_standard_input_and_output() -> None:
+    async def work() -> str:
+        server = StdioServerParameters(
+            command=COMMAND[0], args=COMMAND[1:], env=ENVIRONMENT, cwd=str(Path.cwd())
+        )
+        async with mcp.Client(server) as client:
+            found = await values(client, "look")
+            assert found["blasts_left"] == 0
+            return found["problem"]
+
+    assert within(work) == "control_room-known-v2"
+
+
+def test_http_needs_the_token() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [*COMMAND, "--http", "--port", str(port)]
+    with subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True) as server:
+        assert server.stderr is not None
+        try:
+            token = server.stderr.readline().split()[-1].rstrip(")")
+            within(lambda: by_http(f"http://127.0.0.1:{port}/mcp", token))
+        finally:
+            server.terminate()
+            server.stderr.close()
+
+
+async def by_http(url: str, token: str) -> None:
+    async with httpx2.AsyncClient(timeout=30.0) as bare:
+        for _ in range(100):
+            try:
+                refused = await bare.post(url, json={})
+                break
+            except httpx2.ConnectError:
+                time.sleep(0.1)
+        assert refused.status_code == 403
+        assert "with its token" in refused.text
+    headers = {"Authorization": f"Bearer {token}"}
+    for mode in ("auto", "legacy"):
+        async with httpx2.AsyncClient(headers=headers, timeout=30.0) as known:
+            transport = streamable_http_client(url, http_client=known)
+            async with mcp.Client(transport, mode=mode) as client:
+                assert (await values(client, "look"))["problem"] == "control_room-known-v2"
