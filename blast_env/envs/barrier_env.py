@@ -231,9 +231,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         """
         self._check(action)
         self.episodes.place([0], [int(action)])
-        self.episodes.blast([0])
+        self.episodes.blast()
         observation = self._observation()
-        reward = self.episodes.reward(0)
+        reward = float(self.episodes.rewards([0])[0])
         terminated = self._episode.ended
         info = self.episodes.information(0)
         self._show()

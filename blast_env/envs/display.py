@@ -176,7 +176,7 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
 
     shown, evaluator = _shown_threat(episode), episode.evaluator
     # Sorted as for the assessment: the order may change the last bits.
-    layout = tuple(sorted(episode.transition.after))
+    layout = tuple(sorted(episode.final or ()))
     charges = len(episode.case.charges)
     remark = f": the worst of {charges} charges" if charges > 1 else ""
     blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
@@ -186,7 +186,7 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
 
 def _shown_threat(episode: Episode) -> LoadCase:
     """Return the worst threat, with its first realisation."""
-    case, layout = episode.case, episode.transition.after
+    case, layout = episode.case, episode.final or ()
     blasts = episode.evaluator.loads_of_many([(layout, threat) for threat in case.threats])
     loads = np.array([blast.load(case.scenario.objective) for blast in blasts])
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)

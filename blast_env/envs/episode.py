@@ -1,7 +1,7 @@
 """Episodes of placing, one or many at once: place, blast, observe, reward."""
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import fsum
@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import concatenate, create_empty_array
 from numpy.typing import NDArray
 
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.envs.actions import ActionChoice, ActionNumbers, Actions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observable import (
@@ -23,6 +24,7 @@ from blast_env.envs.observable import (
 )
 from blast_env.envs.strategies import (
     HiddenThreat,
+    OccasionalReward,
     Reward,
     ScenarioSource,
     ThreatModel,
@@ -60,8 +62,10 @@ INVALID_ACTIONS: Final = ("nearest", "penalty")
 
 _NO_CHARGE: Final = Charge((0.0, 0.0), 0.0)
 _NOTHING: Final = Assessment(0.0, 0.0, 0.0, 0.0, False)
-_FINISHES: Final = -1
-"""In the place of an element's number: the action finishes."""
+_FINISHES, _CHOOSES, _ILLEGAL = -1, -2, -3
+"""In the place of an element's number: the action finishes, is a choice, or has no effect."""
+
+_NO_ACTION: Final = -1
 
 _MOST_SHOWN: Final = 64
 """Most charges of a site for which the constant observations are kept."""
@@ -228,21 +232,19 @@ def _keep(kept: OrderedDict[Any, Any], key: Any, value: Any) -> None:
 
 @dataclass(eq=False)
 class Episode:
-    """The state of an episode, besides its layout.
+    """An episode, besides its layout and what changes in every turn.
 
     Attributes:
         task: The task.
         site: The common parts of its site.
         shown: What the agent is shown.
         seeds: Seeds of the blasts of each charge (charges, realisations).
-        transition: The change by the last action.
+        initial: The layout at the beginning.
         terms: The terms of the last reward; before the first action all are 0.
         chosen: The choices so far for the next module or piece; `None` before the first.
         invalid_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
-        repeated: The last action if it changed nothing; `None` otherwise.
-        begun: Whether there has been an action.
-        ended: Whether the charge has gone off.
+        final: The layout against which the charge has gone off; `None` before.
         loads: The loads with each layout against which the charges went off.
     """
 
@@ -250,15 +252,18 @@ class Episode:
     site: _Site
     shown: _Shown
     seeds: NDArray[np.int64]
-    transition: Transition
+    initial: Layout
     terms: Terms
     chosen: ActionChoice | None = None
     invalid_actions: int = 0
     without_effect: int = 0
-    repeated: int | None = None
-    begun: bool = False
-    ended: bool = False
+    final: Layout | None = None
     loads: dict[Layout, Assessment] = field(default_factory=dict)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the charge has gone off."""
+        return self.final is not None
 
     @property
     def evaluator(self) -> BlastEvaluator:
@@ -267,7 +272,8 @@ class Episode:
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return the loads with the final layout and without a barrier."""
-        return self.loads[self.transition.after], self.loads[()]
+        assert self.final is not None
+        return self.loads[self.final], self.loads[()]
 
     @cached_property
     def case(self) -> LoadCaseSet:
@@ -284,9 +290,9 @@ class Episode:
     @property
     def outcome(self) -> Mapping[str, Any]:
         """The information on the blasts; before the end, loads and counts are 0."""
-        if not self.ended:
+        if self.final is None:
             return self.site.no_outcome(len(self.shown.charges))
-        charges = self.case.charges_against(self.transition.after)
+        charges = self.case.charges_against(self.final)
         return _outcome(self.evaluator, *self.assess(), charges)
 
     @cached_property
@@ -335,6 +341,10 @@ def _outcome(
     }
 
 
+def _always(begins: BoolArray, ended: BoolArray) -> BoolArray:  # noqa: ARG001
+    return np.ones(len(ended), dtype=np.bool_)
+
+
 class Episodes:
     """Episodes of one task side by side, each begun again when it has ended.
 
@@ -345,7 +355,8 @@ class Episodes:
     Attributes:
         task: The task.
         layouts: The layouts, in arrays.
-        running: The state of each episode; empty before the first `begin`.
+        running: Each episode; empty before the first `begin`.
+        ended: Whether the charge of each has gone off (episodes,).
     """
 
     def __init__(self, task: Task, count: int) -> None:
@@ -355,6 +366,14 @@ class Episodes:
         self._most_sites = max(count, 4)
         first = self.site_of(task.source.representative)  # an unsuitable engine fails here
         self.layouts = LayoutBatch(first.empty, first.rules, count)
+        self.ended: BoolArray = np.zeros(count, dtype=np.bool_)
+        self._begins: BoolArray = np.ones(count, dtype=np.bool_)  # the last action was the first
+        self._has_begun: BoolArray = np.zeros(count, dtype=np.bool_)
+        self._before: IntArray = np.zeros(count, dtype=np.int64)  # elements before the last action
+        self._repeated: IntArray = np.full(count, _NO_ACTION)  # the last one, if without effect
+        self._turns: dict[int, Transition] = {}  # the last ones of those that may pay
+        reward = task.reward
+        self._pays = reward.pays if isinstance(reward, OccasionalReward) else _always
 
     def begin(
         self, indices: Sequence[int], rngs: Sequence[np.random.Generator], options: ResetOptions
@@ -386,18 +405,17 @@ class Episodes:
                     scenario = scenario.with_possible_charges(charges)
                 start = LayoutState.of(scenario, options.layout)
                 self.layouts.begin([index], PlacementRules.of(start), start)
-            initial = start.checked
-            turn = Transition(
-                site.empty.scenario.objective, *(initial,) * 3, begins=True, ended=False
-            )
             shown = site.shown_of(self.task, charges)
-            begun.append(Episode(self.task, site, shown, seeds, turn, site.terms))
+            begun.append(Episode(self.task, site, shown, seeds, start.checked, site.terms))
         for site, own in on_sites.values():
             self.layouts.begin(own, site.rules, site.empty)
         for index, episode in zip(indices, begun, strict=True):
             if index == len(self.running):
                 self.running.append(episode)
             self.running[index] = episode
+        chosen = np.array(indices)
+        self.ended[chosen] = self._has_begun[chosen] = False
+        self._repeated[chosen] = _NO_ACTION
 
     def _drawn(
         self, rng: np.random.Generator, options: ResetOptions
@@ -421,49 +439,60 @@ class Episodes:
             indices: The episodes.
             actions: One of its `ActionNumbers` for each.
         """
-        layouts = self.layouts
-        made = [*map(self._made, indices, actions)]
-        placed = [
-            (index, found)
-            for index, found in zip(indices, made, strict=True)
-            if type(found) is int and found >= 0
-        ]
-        layouts.place([index for index, _ in placed], [found for _, found in placed])
-        is_full = layouts.is_full.tolist()
-        for index, action, found in zip(indices, actions, made, strict=True):
+        chosen, layouts = np.array(indices), self.layouts
+        wanted = np.array(actions)
+        found = self._all_made(chosen, wanted)
+        self._before[chosen] = layouts.placed[chosen]
+        self._begins[chosen] = ~self._has_begun[chosen]
+        self._has_begun[chosen] = True
+        places = found >= 0
+        layouts.place(chosen[places], found[places])
+        stops, illegal = found == _FINISHES, found == _ILLEGAL
+        for position in np.flatnonzero(illegal).tolist():
+            index = indices[position]
             episode = self.running[index]
-            before = after = episode.transition.after
-            if type(found) is int and found >= 0:
-                after = LegalLayout(layouts.layouts[index])
-                after.scenario = layouts.rules[index].scenario
-            stops = found == _FINISHES
-            if found is None:
-                episode.without_effect += 1
-                repeats = self.task.illegal.moves and action == episode.repeated
-                stops = repeats or episode.without_effect >= self.task.illegal.limit
-            episode.repeated = action if found is None else None
-            episode.ended = stops or is_full[index]
-            last = episode.transition
-            episode.transition = Transition(
-                last.objective, last.initial, before, after, not episode.begun, episode.ended
-            )
-            episode.begun = True
+            episode.without_effect += 1
+            repeats = self.task.illegal.moves and wanted[position] == self._repeated[index]
+            stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
+        self._repeated[chosen] = np.where(illegal, wanted, _NO_ACTION)
+        self.ended[chosen] = stops | layouts.is_full[chosen]
+        self._turns = {}
+        for index in chosen[self._pays(self._begins[chosen], self.ended[chosen])].tolist():
+            self._turns[index] = self._turn(index)
+        for index in chosen[self.ended[chosen]].tolist():
+            turn = self._turns.get(index)
+            self.running[index].final = layouts.checked(index) if turn is None else turn.after
 
-    def _made(self, index: int, action: int) -> int | ActionChoice | None:
-        """Return what an action does in an episode, and record its choice.
+    def _turn(self, index: int) -> Transition:
+        """Return the last turn of an episode."""
+        episode, before = self.running[index], int(self._before[index])
+        after = self.layouts.checked(index)
+        earlier = LegalLayout(after[:before]) if before < len(after) else after
+        earlier.scenario = after.scenario
+        ends = bool(self._begins[index]), bool(self.ended[index])
+        objective = episode.site.empty.scenario.objective
+        return Transition(objective, episode.initial, earlier, after, *ends)
 
-        Returns:
-            The number of the element to place, `_FINISHES`, a further choice; or `None` for an
-            illegal action without effect.
+    def _all_made(self, chosen: IntArray, wanted: IntArray) -> IntArray:
+        """Return what actions do in episodes, and record choices (episodes,).
+
+        It is the number of the element to place, `_FINISHES`, `_CHOOSES` or `_ILLEGAL`.
         """
-        episode, legal = self.running[index], self.layouts.legal[index]
-        actions = episode.shown.actions
+        actions = self.running[chosen[0]].shown.actions
+        found: IntArray = np.full(len(chosen), _ILLEGAL)
         if actions.are_plain:  # the usual case, without the time to make a choice
-            if action == actions.finish:
-                return _FINISHES
-            if legal.item(action):
-                return action
-        choice = episode.chosen or ActionChoice(legal)
+            cells = np.minimum(wanted, actions.finish - 1)
+            is_legal = self.layouts.legal.reshape(len(self.running), -1)[chosen, cells]
+            found = np.where(is_legal, wanted, found)
+            found[wanted == actions.finish] = _FINISHES
+        for position in np.flatnonzero(found == _ILLEGAL).tolist():
+            found[position] = self._made(int(chosen[position]), int(wanted[position]))
+        return found
+
+    def _made(self, index: int, action: int) -> int:
+        """Return the same for one action; illegal ones are counted."""
+        episode = self.running[index]
+        actions, choice = episode.shown.actions, self._choice(index)
         if action == actions.finish and choice.choices == 0:
             return _FINISHES
         found = actions.narrowed(choice, action)
@@ -471,12 +500,13 @@ class Episodes:
             episode.invalid_actions += 1
             nearest = actions.nearest(choice, action) if self.task.illegal.moves else None
             found = None if nearest is None else actions.narrowed(choice, nearest)
-        if found is not None:
-            episode.chosen = found if isinstance(found, ActionChoice) else None
-        return found
+        if found is None:
+            return _ILLEGAL
+        episode.chosen = found if isinstance(found, ActionChoice) else None
+        return found if isinstance(found, int) else _CHOOSES
 
-    def blast(self, indices: Iterable[int]) -> None:
-        """Set off the charges of episodes against the layouts that the last transition needs.
+    def blast(self) -> None:
+        """Set off the charges of episodes against the layouts that the last turns need.
 
         The blasts of all of them run in one batch.
 
@@ -484,9 +514,8 @@ class Episodes:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
         """
         due: list[tuple[Episode, Layout]] = []
-        for index in indices:
+        for index, turn in self._turns.items():
             episode = self.running[index]
-            turn = episode.transition
             layouts = tuple(self.task.reward.layouts(turn))
             if turn.ended:
                 layouts = (*layouts, turn.after, ())
@@ -507,25 +536,32 @@ class Episodes:
             if not layout:
                 _keep(episode.site.bare, episode.loads_key, episode.loads[()])
 
-    def reward(self, index: int) -> float:
-        """Return the reward of the last action, whose terms the information has.
+    def rewards(self, indices: Sequence[int]) -> FloatArray:
+        """Return the rewards of the last actions (episodes,); episodes have their terms.
 
         Raises:
             BlastEnvError: If the terms differ from those that the reward names.
         """
-        episode = self.running[index]
-        has_effect = episode.repeated is None
-        terms = {
-            **self.task.reward(episode.transition, episode.loads),
-            ILLEGAL_TERM: 0.0 if has_effect else -self.task.illegal.cost,
-        }
-        if [*terms] != [*episode.terms]:
-            found, named = (", ".join([*item][:-1]) for item in (terms, episode.terms))
-            raise BlastEnvError(
-                f"the reward has the terms {found}, must have those that it names: {named}"
-            )
-        episode.terms = terms
-        return fsum(terms.values())
+        cost, rewards = self.task.illegal.cost, np.zeros(len(indices))
+        has_effect = (self._repeated[indices] == _NO_ACTION).tolist()
+        for position, (index, of_use) in enumerate(zip(indices, has_effect, strict=True)):
+            episode, turn = self.running[index], self._turns.get(index)
+            if turn is None and of_use:
+                episode.terms = episode.site.terms
+                continue
+            paid = {} if turn is None else self.task.reward(turn, episode.loads)
+            terms = {
+                **(paid if turn else episode.site.terms),
+                ILLEGAL_TERM: 0.0 if of_use else -cost,
+            }
+            if [*terms] != [*episode.site.terms]:
+                found, named = (", ".join([*item][:-1]) for item in (terms, episode.site.terms))
+                raise BlastEnvError(
+                    f"the reward has the terms {found}, must have those that it names: {named}"
+                )
+            episode.terms = terms
+            rewards[position] = fsum(terms.values())
+        return rewards
 
     def observe(self, indices: Sequence[int], space: spaces.Space[Any]) -> Any:
         """Return the observations of some episodes, with a leading axis (episodes, ...).
@@ -568,12 +604,12 @@ class Episodes:
             legal = self.layouts.legal if are_all else self.layouts.legal[list(indices)]
             masks[:, :-1] = legal.reshape(len(legal), -1)
             masks[:, -1] = 1
-        for position, index in enumerate(indices):
-            episode = self.running[index]
-            if episode.ended:
-                masks[position, :-1], masks[position, -1] = 0, 1
-            elif not actions.are_plain:
-                masks[position] = episode.shown.actions.mask(self._choice(index))
+        else:
+            for position, index in enumerate(indices):
+                of_episode = self.running[index].shown.actions
+                masks[position] = of_episode.mask(self._choice(index))
+        over = self.ended[list(indices)]
+        masks[over, :-1], masks[over, -1] = 0, 1
         return masks
 
     def information(self, index: int) -> dict[str, Any]:
@@ -586,7 +622,7 @@ class Episodes:
         return {
             "action_mask": self.masks([index])[0],
             "invalid_actions": episode.invalid_actions,
-            "placed": len(self.layouts.layouts[index]),
+            "placed": int(self.layouts.placed[index]),
             "layout": self.layouts.table[index].copy(),
             "reward_terms": dict(episode.terms),
             **episode.outcome,

@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from blast_env.arrays import BoolArray
 from blast_env.bundled import GENERATED
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Assessment
@@ -228,6 +229,14 @@ class Reward(Protocol):
         """
 
 
+@runtime_checkable
+class OccasionalReward(Reward, Protocol):
+    """A reward that pays in few turns; in the others all terms are 0, and nobody asks it."""
+
+    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:
+        """Return in which turns it may pay (turns,); see `Transition` for the arguments."""
+
+
 DEPOSIT: Final = 2.0
 """Deposit as a multiple of the load without a barrier: more than the load with any layout."""
 
@@ -246,6 +255,10 @@ class TerminalReward:
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
         """Return `impulse` (psi s), `peak` (psi), `load` (both) or `response`, and `deposit`."""
         return scenario.objective.term, "deposit"
+
+    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:
+        """Return the turns at the beginning and at the end."""
+        return begins | ended
 
     def layouts(self, transition: Transition) -> Sequence[Layout]:
         """Return no barrier, at the beginning."""
@@ -310,6 +323,10 @@ class ReductionReward:
     def terms(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
         """Return `reduction`."""
         return ("reduction",)
+
+    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:  # noqa: ARG002
+        """Return the turns at the end."""
+        return ended
 
     def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
         """Return none: those at the end are enough."""

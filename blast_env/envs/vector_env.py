@@ -147,14 +147,15 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         if not self._running or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
             raise gym.error.ResetNeeded(f"call reset: no episode in environments {begun}")
         wanted = self._checked(actions, played)
-        self.episodes.place(played, [wanted[index] for index in played])
-        self.episodes.blast(played)
         rewards = np.zeros(self.num_envs)
-        rewards[played] = [self.episodes.reward(index) for index in played]
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        terminated[played] = [self._running[index].ended for index in played]
-        for index in _indices(terminated):
-            self._note([index], self._running[index].outcome)
+        if played:
+            self.episodes.place(played, wanted[played])
+            self.episodes.blast()
+            rewards[played] = self.episodes.rewards(played)
+            terminated[played] = self.episodes.ended[played]
+            ended = _indices(terminated)
+            self._note(ended, [self._running[index].outcome for index in ended])
         self._steps[played] += 1
         truncated = self._steps >= self._most_steps
         truncated[begun] = False
@@ -185,7 +186,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     def _all(self) -> range:
         return range(self.num_envs)
 
-    def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> list[int]:
+    def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> IntArray:
         given = np.asarray(actions)
         if given.shape != (self.num_envs,) or not np.issubdtype(given.dtype, np.integer):
             raise gym.error.InvalidAction(
@@ -197,8 +198,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             raise gym.error.InvalidAction(
                 f"actions are from {least} to {most}, must be in {self.one.action_space}"
             )
-        wanted: list[int] = given.tolist()
-        return wanted
+        return given
 
     def _begin(self, chosen: Sequence[int], options: ResetOptions) -> None:
         """Begin an episode in some environments; the first time in all."""
@@ -208,26 +208,22 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         rngs = [rng for index in chosen if (rng := self._rngs[index]) is not None]
         self.episodes.begin(chosen, rngs, options)
         self._steps[chosen] = 0
-        of_outcomes: dict[int, tuple[Mapping[str, Any], list[int]]] = {}
-        for index in chosen:
-            episode = self._running[index]
-            self._note([index], episode.constants)
-            outcome = episode.outcome  # one object for all with as many charges on a site
-            of_outcomes.setdefault(id(outcome), (outcome, []))[1].append(index)
-        for outcome, own in of_outcomes.values():
-            self._note(own, outcome)
+        episodes = [self._running[index] for index in chosen]
+        self._note(chosen, [episode.constants for episode in episodes])
+        self._note(chosen, [episode.outcome for episode in episodes])
 
-    def _note(self, indices: list[int], values: Mapping[str, Any]) -> None:
+    def _note(self, indices: Sequence[int], values: Sequence[Mapping[str, Any]]) -> None:
         """Note values of the information of environments until others take their place."""
-        for name, value in values.items():
+        for name in values[0] if values else ():
+            of_name = [of_one[name] for of_one in values]
             noted = self._noted.get(name)
             if noted is None:
-                noted = self._noted[name] = _like(value, self.num_envs)
-            if noted.dtype == object or len(indices) == 1:
-                for index in indices:
-                    noted[index] = value
-            else:
-                noted[indices] = value
+                noted = self._noted[name] = _like(of_name[0], self.num_envs)
+            if noted.dtype != object:
+                noted[indices] = of_name
+                continue
+            for index, value in zip(indices, of_name, strict=True):
+                noted[index] = value
 
     def _begin_again(self, over: Sequence[int]) -> dict[str, Any]:
         """Begin episodes where others have ended; return the last observation and information."""
@@ -259,7 +255,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         arrays: dict[str, Any] = {
             "action_mask": self.episodes.masks(self._all),
             "invalid_actions": np.array([item.invalid_actions for item in running]),
-            "placed": np.array([len(layout) for layout in layouts.layouts]),
+            "placed": layouts.placed.copy(),
             "layout": layouts.table.copy(),
         } | {name: value.copy() for name, value in self._noted.items()}
         terms = {name: np.array([item.terms[name] for item in running]) for name in names}

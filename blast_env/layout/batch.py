@@ -1,15 +1,14 @@
 """Layouts of several environments that grow in place, with their legal places, in arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import fsum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.geometry import Element, Layout, Measure
-from blast_env.layout.placement import LayoutState
+from blast_env.layout.placement import LegalLayout, LayoutState
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
 from blast_env.site.zone import BuildZone
@@ -63,10 +62,6 @@ class PlacementRules:
             variants,
         )
 
-    def cost(self, number: int) -> float:
-        """Return the cost of an element by its number."""
-        return float(self.costs.item(number))
-
 
 class LayoutBatch:
     """Layouts that grow piece by piece; their legal places are those of `LayoutState`.
@@ -87,8 +82,8 @@ class LayoutBatch:
         left: Pieces left in all, then of each item (layouts, 1 + items).
         budget_left: Remaining budget; 0 without one (layouts,).
         is_full: Whether nothing more can be placed (layouts,).
+        placed: Number of elements in each (layouts,).
         rules: The rules for each layout.
-        layouts: The elements of each.
     """
 
     def __init__(self, start: LayoutState, rules: PlacementRules, count: int) -> None:
@@ -99,92 +94,103 @@ class LayoutBatch:
         self.left: IntArray = np.zeros((count, 1 + len(start.catalogue.stocks)), dtype=np.int64)
         self.budget_left: FloatArray = np.zeros(count)
         self.is_full: BoolArray = np.zeros(count, dtype=np.bool_)
+        self.placed: IntArray = np.zeros(count, dtype=np.int64)
         self.rules: list[PlacementRules] = [rules] * count
-        self.layouts: list[list[Element]] = [[] for _ in range(count)]
-        self._spent: list[list[float]] = [[] for _ in range(count)]
+        self._numbers: IntArray = np.zeros((count, max(start.stock_left, 1)), dtype=np.int64)
+        self._sites: IntArray = np.zeros(count, dtype=np.int64)  # the same number, the same rules
 
     def begin(self, indices: Sequence[int], rules: PlacementRules, start: LayoutState) -> None:
         """Put a layout in the place of others."""
         if not indices:
             return
-        catalogue, spent = rules.catalogue, []
+        catalogue = rules.catalogue
         table = np.zeros(self.table.shape[1:], dtype=np.int8)
         left = np.array([start.stock_left, *catalogue.stocks])
+        numbers = [catalogue.action(element) for element in start.layout]
         for element in start.layout:
             number = catalogue.variant_number(element)
             table[number, element[0], element[1]] = 1
-            spent.append(float(rules.costs[number, element[0], element[1]]))
             if catalogue.has_items:
                 left[1 + catalogue.variants[number].item] -= 1
         if not catalogue.has_items:
             left[1] = start.stock_left
+        more = rules.zone.stock - self._numbers.shape[1]
+        if more > 0:
+            self._numbers = np.pad(self._numbers, ((0, 0), (0, more)))
         rows = slice(None) if len(indices) == len(self.rules) else indices
         self.legal[rows], self.occupancy[rows] = start.legal, start.occupancy
         self.table[rows], self.left[rows] = table, left
         self.budget_left[rows] = start.budget_left or 0.0
         self.is_full[rows] = not start.legal.any()
+        self._numbers[rows, : len(numbers)], self.placed[rows] = numbers, len(numbers)
+        self._sites[rows] = id(rules)
         for index in indices:
             self.rules[index] = rules
-            self.layouts[index] = list(start.layout)
-            self._spent[index] = spent.copy()
 
-    def place(self, indices: Sequence[int], numbers: Sequence[int]) -> None:
+    def place(self, indices: Sequence[int] | IntArray, numbers: Sequence[int] | IntArray) -> None:
         """Place an element on a legal place in each of some layouts.
 
         Args:
-            indices: The layouts, different ones.
-            numbers: The number of the element in the catalogue, for each.
+            indices: The layouts, different ones (n,).
+            numbers: The number of the element in the catalogue, for each (n,).
         """
         from blast_env.layout.batch_kernels import find_full, place  # Numba takes long to import
 
-        if not indices:
+        if not len(indices):
             return
-        of_rules: dict[int, list[int]] = {}
-        for index, number in zip(indices, numbers, strict=True):
-            rules = self.rules[index]
-            self.layouts[index].append(rules.element(number))
-            if rules.zone.budget is not None or rules.zone.access_way is not None:
-                of_rules.setdefault(id(rules), []).append(index)
-            if rules.zone.budget is not None:
-                self._spent[index].append(rules.cost(number))
-        chosen = np.array(indices)
+        indices, numbers = np.asarray(indices), np.asarray(numbers)
+        self._numbers[indices, self.placed[indices]] = numbers
+        self.placed[indices] += 1
         arrays = self.legal, self.occupancy, self.table, self.left
-        place(chosen, np.array(numbers), self.rules[indices[0]].variants, *arrays)
-        for own in of_rules.values():
+        place(indices, numbers, self.rules[indices[0]].variants, *arrays)
+        sites = self._sites[indices]
+        for site in dict.fromkeys(sites.tolist()):
+            own = indices[sites == site]
             self._limit_to_budget(own)
             self._keep_open(own)
-        find_full(chosen, self.legal, self.is_full)
+        find_full(indices, self.legal, self.is_full)
 
-    def _limit_to_budget(self, indices: Sequence[int]) -> None:
+    def _limit_to_budget(self, indices: IntArray) -> None:
         """Take away places beyond the budget, in layouts of the same rules."""
+        from blast_env.layout.batch_kernels import exact_costs, limit  # as in `place`
+
         rules = self.rules[indices[0]]
         if rules.zone.budget is None:
             return
-        spent = np.array([fsum(self._spent[index]) for index in indices])  # exact: in any order
+        spent = exact_costs(indices, self._numbers, self.placed, rules.costs)  # in any order
         self.budget_left[indices] = np.maximum(0.0, rules.zone.budget - spent)
         spendable = rules.zone.cost_limit - spent
         short = spendable < rules.dearest
         if short.any():
-            from blast_env.layout.batch_kernels import limit  # as in `place`
+            limit(indices[short], spendable[short], rules.costs, self.legal)
 
-            limit(np.array(indices)[short], spendable[short], rules.costs, self.legal)
-
-    def _keep_open(self, indices: Sequence[int]) -> None:
+    def _keep_open(self, indices: IntArray) -> None:
         """Take away places that would close the access way, in layouts of the same rules."""
         rules = self.rules[indices[0]]
         if rules.zone.access_way is None:
             return
-        for index in indices:
-            if isinstance(self.layouts[index][-1], Measure):
+        for index in indices.tolist():
+            if isinstance(self.elements(index)[-1], Measure):
                 continue
             passable = rules.passable & (self.occupancy[index] == 0)
             closing = closing_places(rules.zone.access_way, passable, rules.sizes)
             for own, closes in zip(self.legal[index], closing, strict=True):
                 own &= ~closes
 
+    def elements(self, index: int) -> Layout:
+        """Return the elements of a layout, in the order of placement."""
+        of_number, count = self.rules[index].element, int(self.placed[index])
+        return tuple(map(of_number, self._numbers[index, :count].tolist()))
+
+    def checked(self, index: int) -> LegalLayout:
+        """Return the same, marked as checked by its rules."""
+        layout = LegalLayout(self.elements(index))
+        layout.scenario = self.rules[index].scenario
+        return layout
+
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""
-        state = LayoutState(self.rules[index].scenario, tuple(self.layouts[index]))
+        state = LayoutState(self.rules[index].scenario, self.elements(index))
         legal, occupancy = self.legal[index].copy(), self.occupancy[index].copy()
         legal.flags.writeable = False
         vars(state).update(legal=legal, occupancy=occupancy)
@@ -208,18 +214,22 @@ class LayoutBatch:
                 if index in possible:
                     legal[position] = possible[index]
         return Placements(
-            [self.rules[index] for index in chosen],
-            [self.layouts[index] for index in chosen],
+            self.rules if are_all else [self.rules[index] for index in chosen],
+            lambda position: self.elements(chosen[position]),
             *(legal, self.occupancy[rows], self.left[rows], self.budget_left[rows]),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """Several layouts, in arrays; see `LayoutBatch` for the attributes."""
+    """Several layouts, in arrays; see `LayoutBatch` for the other attributes.
+
+    Attributes:
+        layout: Returns the elements of one, by its position.
+    """
 
     rules: Sequence[PlacementRules]
-    layouts: Sequence[Sequence[Element]]
+    layout: Callable[[int], Layout]
     legal: BoolArray
     occupancy: NDArray[np.uint8]
     left: IntArray
@@ -231,8 +241,4 @@ class Placements:
         left = np.array([[state.stock_left, *state.stocks_left]])
         budget_left = np.array([state.budget_left or 0.0])
         arrays = state.legal[np.newaxis], state.occupancy[np.newaxis], left, budget_left
-        return cls([PlacementRules.of(state)], [state.layout], *arrays)
-
-    def layout(self, position: int) -> Layout:
-        """Return a layout."""
-        return tuple(self.layouts[position])
+        return cls([PlacementRules.of(state)], lambda _: state.layout, *arrays)

@@ -54,3 +54,50 @@ def find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
     """Find whether each of some layouts has no legal place left."""
     for index in indices:
         is_full[index] = not legal[index].any()
+
+
+@njit(cache=True, nogil=True)
+def exact_costs(
+    indices: IntArray, numbers: IntArray, placed: IntArray, costs: FloatArray
+) -> FloatArray:
+    """Return the cost of each of some layouts (indices,), as by `math.fsum`.
+
+    Shewchuk (1997): partial sums without common bits, from the least up, of each layout. (1) Each
+    cost is added to all of them, and the rounding error of each addition is kept; (2) they are
+    summed from the largest down until an addition rounds; (3) a tie is rounded by the next one.
+
+    Args:
+        indices: The layouts.
+        numbers: Numbers of the elements of all layouts (layouts, most elements).
+        placed: Number of elements in each (layouts,).
+        costs: Cost by the element's number, in any shape.
+    """
+    flat, found = costs.reshape(-1), np.zeros(len(indices))
+    partial = np.empty(numbers.shape[1] + 1)
+    for position, index in enumerate(indices):
+        count = 0
+        for place in range(placed[index]):
+            x, kept = flat[numbers[index, place]], 0
+            for other in range(count):  # (1)
+                large, small = partial[other], x
+                if abs(large) < abs(small):
+                    large, small = small, large
+                x = large + small
+                error = small - (x - large)
+                if error != 0.0:
+                    partial[kept] = error
+                    kept += 1
+            partial[kept] = x
+            count = kept + 1
+        total, error = 0.0, 0.0
+        while count > 0 and error == 0.0:  # (2)
+            count -= 1
+            before, x = total, partial[count]
+            total = before + x
+            error = x - (total - before)
+        if count > 0 and error * partial[count - 1] > 0.0:  # (3)
+            twice = 2.0 * error
+            if twice == (total + twice) - total:
+                total += twice
+        found[position] = total
+    return found
