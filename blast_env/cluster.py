@@ -2,28 +2,35 @@
 
 It replaces joblib's Dask backend, which waits for ever for work whose worker was killed too often
 or whose scheduler has gone, and submits no more work than the workers present at the start can do.
+Sections of scenario files, and whole scenarios, are sent once: a blast travels as its layout and
+threat, and a worker keeps what it has derived from the site.
 """
 
 import asyncio
 import logging
 import os
+import pickle
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import joblib
+from cloudpickle import CloudPickler
 from joblib.parallel import ParallelBackendBase, SequentialBackend
 
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, import_extra, value_text
 from blast_env.provenance import code_digest, versions
+from blast_env.sections import Section
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -31,6 +38,8 @@ if TYPE_CHECKING:
 _CONNECT_S: Final = 10.0
 _UNDER_WAY: Final = 500
 """Least number of submitted pieces of work, so that workers that join later find some."""
+_MOST_SENT: Final = 256
+"""Most sections that stay on the cluster for further work."""
 _OWN: Final = ("blast_env", "blast_agents")
 _OTHERS: Final = ("numba", "numpy", "pymoo", "pymunk", "scipy")
 """Packages on which the bits of a result may depend."""
@@ -180,6 +189,10 @@ class ClusterBackend(ParallelBackendBase):
 
     Args:
         client: A client connected to the scheduler.
+
+    Attributes:
+        work_bytes: Bytes of all work sent so far, without sections.
+        section_bytes: Bytes of each section sent.
     """
 
     supports_retrieve_callback = True
@@ -190,6 +203,9 @@ class ClusterBackend(ParallelBackendBase):
         self._client = client
         self._done: SimpleQueue[_Done | None] = SimpleQueue()
         self._under_way: set[Future] = set()
+        self._sent: OrderedDict[int, _Sent] = OrderedDict()
+        self.work_bytes = 0
+        self.section_bytes: list[int] = []
 
     def effective_n_jobs(self, n_jobs: int | None) -> int:  # noqa: ARG002
         """Return the number of pieces of work to keep submitted; `n_jobs` does not change it."""
@@ -206,11 +222,36 @@ class ClusterBackend(ParallelBackendBase):
 
     def submit(self, func: Callable[[], Any], callback: Callable[[_Outcome], None]) -> "Future":
         """Submit a piece of work; `callback` is called with its outcome."""
-        future = self._client.submit(_do, func, _origin(), pure=False)
+        packed, common = self._packed(func)
+        future = self._client.submit(_do, packed, _origin(), *common, pure=False)
         self._under_way.add(future)
         done = self._done
         future.add_done_callback(lambda future: done.put(_Done(future, callback)))
         return future
+
+    def _packed(self, work: Callable[[], Any]) -> "tuple[bytes, list[Future]]":
+        """Return a piece of work as bytes without its sections, and those, which are sent once."""
+        common: dict[int, Future] = {}
+        buffer = BytesIO()
+        _Packer(buffer, lambda section: self._place(section, common)).dump(work)
+        packed = buffer.getvalue()
+        self.work_bytes += len(packed)
+        return packed, list(common.values())
+
+    def _place(self, section: Section, common: "dict[int, Future]") -> int:
+        """Return the place of a section among those of a piece of work."""
+        key = id(section)
+        sent = self._sent.get(key)
+        if sent is None:
+            packed = pickle.dumps(section)
+            self.section_bytes.append(len(packed))
+            content = self._client.submit(_unpacked, packed, _origin(), pure=False)
+            sent = self._sent[key] = _Sent(section, content)
+            if len(self._sent) > _MOST_SENT:
+                self._sent.popitem(last=False)
+        self._sent.move_to_end(key)
+        common.setdefault(key, sent.content)
+        return list(common).index(key)
 
     def retrieve_result_callback(self, outcome: _Outcome) -> Any:
         """Return the result of a piece of work, or raise its error."""
@@ -282,13 +323,61 @@ def _lost() -> BlastEnvError:
     )
 
 
-def _do(work: Callable[[], Any], origin: str) -> Any:
+class _Sent(NamedTuple):
+    """A section that workers have, or can get from another, and its place on the cluster.
+
+    The section itself is kept, so that no other takes its identity.
+    """
+
+    section: Section
+    content: "Future"
+
+
+class _Packer(CloudPickler):  # type: ignore[misc]  # has no types
+    """Puts places in the place of sections.
+
+    Args:
+        buffer: Where the bytes go.
+        place: Returns the place of a section.
+    """
+
+    def __init__(self, buffer: BytesIO, place: Callable[[Section], int]) -> None:
+        super().__init__(buffer)
+        self._place = place
+
+    def persistent_id(self, obj: Any) -> int | None:
+        return self._place(obj) if isinstance(obj, Section) else None
+
+
+class _Unpacker(pickle.Unpickler):
+    """Puts sections in the place of their places; see `_Packer`."""
+
+    def __init__(self, packed: bytes, common: Sequence[Section]) -> None:
+        super().__init__(BytesIO(packed))
+        self._common = common
+
+    def persistent_load(self, pid: int) -> Section:
+        return self._common[pid]
+
+
+def _do(packed: bytes, origin: str, *common: Section) -> Any:
     """Do a piece of work, on a worker with the code and versions of the submitting process."""
+    _check(origin)
+    return _Unpacker(packed, common).load()()
+
+
+def _unpacked(packed: bytes, origin: str) -> Section:
+    """Return a section, on such a worker."""
+    _check(origin)
+    section: Section = pickle.loads(packed)
+    return section
+
+
+def _check(origin: str) -> None:
     if _origin() != origin:
         raise BlastEnvError(
             f"cluster: a worker has {_origin()}, must have that of the submitter: {origin}"
         )
-    return work()
 
 
 @cache

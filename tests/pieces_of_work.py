@@ -5,6 +5,7 @@ import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import joblib
 
@@ -48,3 +49,8 @@ class Touch:
         """Leave the file."""
         (self.folder / str(item)).touch()
         time.sleep(0.02)
+
+
+def name_and_seed(blast: Any) -> tuple[str, int]:
+    """Return the name of a blast's site, and the seed."""
+    return blast.scenario.name, blast.seed

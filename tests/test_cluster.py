@@ -12,17 +12,20 @@ from pathlib import Path
 from threading import Timer
 from types import SimpleNamespace
 
+import joblib
 import pytest
 from typer.testing import CliRunner
 
 from blast_env import cluster
 from blast_env.cli import app
-from blast_env.cluster import on_cluster
+from blast_env.cluster import ClusterBackend, on_cluster
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
+from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.record import BlastLoads
 from blast_env.runner import as_completed, run_all
-from tests.pieces_of_work import Touch, process, refuse_three, square, workers_within
+from blast_env.site import load_scenario
+from tests.pieces_of_work import Touch, name_and_seed, process, refuse_three, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD
 
 distributed = pytest.importorskip("distributed")
@@ -118,6 +121,26 @@ def test_a_worker_with_other_code_is_refused(two: Dask, monkeypatch: pytest.Monk
     message = "a worker has blast-env .*, must have that of the submitter: blast-env 0.0.1"
     with on_cluster(two.file), pytest.raises(BlastEnvError, match=message):
         run_all(square, range(2))
+
+
+def test_a_blast_travels_without_its_site(two: Dask) -> None:
+    """The bytes of a blast depend on layout and threat alone, and its site is sent once."""
+    found = {}
+    for name in ("visitor_entrance", "street_front"):
+        scenario = load_scenario(name)
+        threat = draw_threats(scenario, [0])[0]
+        blasts = [EngineBlast(scenario, (), threat.charge, seed) for seed in range(50)]
+        with distributed.Client(scheduler_file=two.file, set_as_default=False) as client:
+            backend = ClusterBackend(client)
+            with joblib.parallel_config(backend=backend, n_jobs=-1):
+                for _ in range(2):
+                    assert run_all(name_and_seed, blasts) == [(name, seed) for seed in range(50)]
+        found[name] = backend.work_bytes / 100, backend.section_bytes
+    (small, of_small), (large, of_large) = found.values()
+    assert (len(of_small), len(of_large)) == (1, 2)  # the other one has a vehicle
+    assert of_large[0] > of_small[0] > 3000
+    assert small == pytest.approx(large, abs=20)
+    assert small < 1200
 
 
 def test_a_command_on_a_cluster_prints_what_it_prints_without(two: Dask) -> None:
