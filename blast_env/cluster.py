@@ -333,7 +333,7 @@ class _Sent(NamedTuple):
     content: "Future"
 
 
-class _Packer(CloudPickler):  # type: ignore[misc]  # has no types
+class _Packer(CloudPickler):
     """Puts places in the place of sections.
 
     Args:

@@ -372,6 +372,7 @@ class Episodes:
         self._before: IntArray = np.zeros(count, dtype=np.int64)  # elements before the last action
         self._repeated: IntArray = np.full(count, _NO_ACTION)  # the last one, if without effect
         self._turns: dict[int, Transition] = {}  # the last ones of those that may pay
+        self._paid: set[int] = set()  # those whose terms may be other than 0
         reward = task.reward
         self._pays = reward.pays if isinstance(reward, OccasionalReward) else _always
 
@@ -432,7 +433,7 @@ class Episodes:
             drawn = tuple(options.charge(draw) for draw in drawn)
         return site, drawn, seeds
 
-    def place(self, indices: Sequence[int], actions: Sequence[int]) -> None:
+    def place(self, indices: Sequence[int], actions: Sequence[int] | IntArray) -> None:
         """Make a choice, place a module or a piece, or finish, in each of some episodes.
 
         Args:
@@ -516,14 +517,16 @@ class Episodes:
         due: list[tuple[Episode, Layout]] = []
         for index, turn in self._turns.items():
             episode = self.running[index]
-            layouts = tuple(self.task.reward.layouts(turn))
+            layouts = dict.fromkeys(self.task.reward.layouts(turn))
             if turn.ended:
-                layouts = (*layouts, turn.after, ())
+                layouts |= {turn.after: None, (): None}
             due += [
                 (episode, layout)
-                for layout in dict.fromkeys(layouts)
+                for layout in layouts
                 if layout not in episode.loads and not self._is_known(episode, layout)
             ]
+        if not due:
+            return
         asked = [
             (episode.evaluator, layout, threat)
             for episode, layout in due
@@ -542,26 +545,25 @@ class Episodes:
         Raises:
             BlastEnvError: If the terms differ from those that the reward names.
         """
-        cost, rewards = self.task.illegal.cost, np.zeros(len(indices))
-        has_effect = (self._repeated[indices] == _NO_ACTION).tolist()
-        for position, (index, of_use) in enumerate(zip(indices, has_effect, strict=True)):
+        chosen, rewards = np.asarray(indices), np.zeros(len(self.running))
+        of_use = self._repeated[chosen] == _NO_ACTION
+        for index in self._paid:
+            self.running[index].terms = self.running[index].site.terms
+        self._paid = {*self._turns, *chosen[~of_use].tolist()}
+        for index in self._paid:
             episode, turn = self.running[index], self._turns.get(index)
-            if turn is None and of_use:
-                episode.terms = episode.site.terms
-                continue
-            paid = {} if turn is None else self.task.reward(turn, episode.loads)
-            terms = {
-                **(paid if turn else episode.site.terms),
-                ILLEGAL_TERM: 0.0 if of_use else -cost,
-            }
+            paid = episode.site.terms if turn is None else self.task.reward(turn, episode.loads)
+            has_effect = self._repeated[index] == _NO_ACTION
+            terms = {**paid, ILLEGAL_TERM: 0.0 if has_effect else -self.task.illegal.cost}
             if [*terms] != [*episode.site.terms]:
                 found, named = (", ".join([*item][:-1]) for item in (terms, episode.site.terms))
                 raise BlastEnvError(
                     f"the reward has the terms {found}, must have those that it names: {named}"
                 )
             episode.terms = terms
-            rewards[position] = fsum(terms.values())
-        return rewards
+            rewards[index] = fsum(terms.values())
+        found_of: FloatArray = rewards[chosen]
+        return found_of
 
     def observe(self, indices: Sequence[int], space: spaces.Space[Any]) -> Any:
         """Return the observations of some episodes, with a leading axis (episodes, ...).
@@ -575,8 +577,10 @@ class Episodes:
             own: list[Any] = [self._observed(index) for index in indices]
             empty: Any = create_empty_array(space, len(own))
             return concatenate(space, own, empty)
-        pairs = zip(indices, episodes, strict=True)
-        possible = {index: e.chosen.possible for index, e in pairs if e.chosen is not None}
+        possible = {}
+        if not episodes[0].shown.actions.are_plain:
+            pairs = zip(indices, episodes, strict=True)
+            possible = {index: e.chosen.possible for index, e in pairs if e.chosen is not None}
         observed = kind.observe_many(observations, self.layouts.placements(indices, possible))
         if isinstance(space, spaces.Dict):
             observed |= {MASK: self.masks(indices)}

@@ -168,10 +168,12 @@ def stock_shares(placements: Placements) -> FloatArray:
     They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
     and the share of the budget (1 without a budget).
     """
-    left = placements.left[:, 0]
+    left, shares = placements.left[:, 0], np.empty((len(placements.left), 3))
     zones = _of_rules(placements, lambda item: (item.zone.budget or np.nan, item.zone.stock))
-    of_budget = np.where(np.isnan(zones[:, 0]), 1.0, placements.budget_left / zones[:, 0])
-    return np.stack((left / zones[:, 1], np.minimum(left / FULL_STOCK, 1.0), of_budget), axis=1)
+    shares[:, 0] = left / zones[:, 1]
+    shares[:, 1] = np.minimum(left / FULL_STOCK, 1.0)
+    shares[:, 2] = np.where(np.isnan(zones[:, 0]), 1.0, placements.budget_left / zones[:, 0])
+    return shares
 
 
 def _of_rules(

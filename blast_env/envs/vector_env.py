@@ -214,16 +214,18 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 
     def _note(self, indices: Sequence[int], values: Sequence[Mapping[str, Any]]) -> None:
         """Note values of the information of environments until others take their place."""
-        for name in values[0] if values else ():
-            of_name = [of_one[name] for of_one in values]
+        if not values:
+            return
+        is_one = all(of_one is values[0] for of_one in values)
+        for name, first in values[0].items():
             noted = self._noted.get(name)
             if noted is None:
-                noted = self._noted[name] = _like(of_name[0], self.num_envs)
+                noted = self._noted[name] = _like(first, self.num_envs)
             if noted.dtype != object:
-                noted[indices] = of_name
+                noted[indices] = first if is_one else [of_one[name] for of_one in values]
                 continue
-            for index, value in zip(indices, of_name, strict=True):
-                noted[index] = value
+            for index, of_one in zip(indices, values, strict=True):
+                noted[index] = of_one[name]
 
     def _begin_again(self, over: Sequence[int]) -> dict[str, Any]:
         """Begin episodes where others have ended; return the last observation and information."""

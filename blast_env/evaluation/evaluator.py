@@ -5,7 +5,7 @@ An evaluator runs and caches the blasts of a scenario; a problem is a case to fi
 
 import dataclasses
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -250,26 +250,20 @@ class BlastEvaluator:
 
 
 def _run(
-    missing: Mapping[BlastKey, tuple[BlastEvaluator, AnyCharge]], processes: int
-) -> Iterator[tuple[BlastKey, BlastLoads]]:
-    """Run blasts, cache the loads in their evaluators, and yield them in order of completion.
-
-    The charges are those of the keys, or the vehicles that carry them.
-    """
-    if not missing:
+    asked: Sequence[tuple[BlastKey, BlastEvaluator, EngineBlast]], processes: int
+) -> Iterator[tuple[int, BlastLoads]]:
+    """Run blasts, cache the loads in their evaluators, and yield (index, loads) when done."""
+    if not asked:
         return
-    engine = next(iter(missing.values()))[0].engine
+    engine = asked[0][1].engine
     # Lots as large as the engine takes less time for than for their parts.
-    keys, size = list(missing), engine.at_once
-    lots = [keys[first : first + size] for first in range(0, len(keys), size)]
-    work = [
-        [EngineBlast(missing[k][0].scenario, k.layout, missing[k][1], k.seed) for k in lot]
-        for lot in lots
-    ]
-    for index, of_lot in as_completed(engine.loads_at_once, work, processes):
-        for key, loads in zip(lots[index], of_lot, strict=True):
-            missing[key][0]._keep(key, BlastRecord(loads))
-            yield key, loads
+    firsts = range(0, len(asked), engine.at_once)
+    work = [[blast for *_, blast in asked[first : first + engine.at_once]] for first in firsts]
+    for lot, of_lot in as_completed(engine.loads_at_once, work, processes):
+        for index, loads in enumerate(of_lot, start=firsts[lot]):
+            key, evaluator, _ = asked[index]
+            evaluator._keep(key, BlastRecord(loads))
+            yield index, loads
 
 
 def loads_together(
@@ -281,30 +275,34 @@ def loads_together(
 
     Arguments and errors are those of `BlastEvaluator.loads_of_many`.
     """
-    # (1) A key per blast, equal for equal blasts; (2) what the store has; (3) run the rest, each
+    # (1) A number per blast, equal for equal blasts; (2) what the store has; (3) run the rest, each
     # blast kept as soon as it is done, so that an interruption loses only those under way; (4) back
     # in the order asked for.
     check_workers("processes", processes)
-    keys = [evaluator.key(layout, threat) for evaluator, layout, threat in asked]
-    found: dict[BlastKey, BlastLoads] = {}
-    missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
-    for key, (evaluator, _, threat) in zip(keys, asked, strict=True):
-        if key in found or key in missing:
-            continue
-        known = evaluator.store.get(key, evaluator.scenario)
-        if known is None:
-            missing[key] = evaluator, threat.charge
-        else:
-            found[key] = known
-    for done, (key, loads) in enumerate(_run(missing, processes), start=1):
-        found[key] = loads
+    distinct: dict[BlastKey, int] = {}  # a hash of a key takes as long as a step of a layout
+    numbers, found = list[int](), list[BlastLoads | None]()
+    missing: dict[int, tuple[BlastKey, BlastEvaluator, EngineBlast]] = {}
+    for evaluator, layout, threat in asked:
+        key = evaluator.key(layout, threat)
+        number = distinct.setdefault(key, len(found))
+        numbers.append(number)
+        if number == len(found):
+            found.append(evaluator.store.get(key, evaluator.scenario))
+            if found[number] is None:
+                # The charge, or the vehicle that carries it to the place in the key.
+                blast = EngineBlast(evaluator.scenario, key.layout, threat.charge, key.seed)
+                missing[number] = key, evaluator, blast
+    places = list(missing)
+    for done, (index, loads) in enumerate(_run(list(missing.values()), processes), start=1):
+        found[places[index]] = loads
         if progress is not None:
-            progress(1.0 - (len(missing) - done) / len(keys))
+            progress(1.0 - (len(missing) - done) / len(numbers))
     if asked:
-        asked[0][0].counts.cache_hits += len(keys) - len(missing)
+        asked[0][0].counts.cache_hits += len(numbers) - len(missing)
+    known = [loads for loads in found if loads is not None]
     return [
-        evaluator.responding(found[key], layout)
-        for key, (evaluator, layout, _) in zip(keys, asked, strict=True)
+        evaluator.responding(known[number], layout)
+        for number, (evaluator, layout, _) in zip(numbers, asked, strict=True)
     ]
 
 

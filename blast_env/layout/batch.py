@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.geometry import Element, Layout, Measure
-from blast_env.layout.placement import LegalLayout, LayoutState
+from blast_env.layout.placement import LayoutState, LegalLayout
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
 from blast_env.site.zone import BuildZone

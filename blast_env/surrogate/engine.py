@@ -53,11 +53,16 @@ class _Served:
         """Return the loads of each layout of a prediction."""
         impulses_pa_s = guess.impulse_pa_s.tolist()
         peaks_pa = guess.peak_pa.tolist() if guess.peak_pa is not None else None
-        found = []
+        places = [self._place[structure.name] for structure in self.site.protected]
+        on_structures = np.zeros((len(impulses_pa_s), len(self._zero_loads)))
+        on_structures[:, places] = guess.impulse_pa_s
+        on_modules = on_structures[:, self._of_modules]
+        responds, found = self.site.scenario.objective.is_response, []
         for index, of_layout in enumerate(impulses_pa_s):
-            loads, on_each = list(self._zero_loads), np.zeros(len(self._zero_loads))
-            for column, structure in enumerate(self.site.protected):
-                place = self._place[structure.name]
+            loads = list(self._zero_loads)
+            for column, (place, structure) in enumerate(
+                zip(places, self.site.protected, strict=True)
+            ):
                 loads[place] = StructureLoad.on(
                     structure,
                     of_layout[column],
@@ -65,10 +70,8 @@ class _Served:
                     notes=_NOTES,
                     validation=_GUESSED,
                 )
-                on_each[place] = of_layout[column]
-            responds = self.site.scenario.objective.is_response
             bays = guess.bays(self.site, index) if responds else ()
-            found.append(BlastLoads(tuple(loads), on_each[self._of_modules], bays))
+            found.append(BlastLoads(tuple(loads), on_modules[index], bays))
         return found
 
 

@@ -126,6 +126,7 @@ SMALLER: Final[dict[str, str]] = {
         "--cell 0.5 --distances 8 --heights 0,0.2"
     ),
     # docs/researchers/training.md
+    "python -m studies.cluster --engine surrogate": "--budget 8 --workers 1",
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
