@@ -135,10 +135,14 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary of the
 
 
 @contextmanager
-def running_on(cluster: str | None) -> Iterator[None]:
-    """Run the blasts of this block on a cluster, if one is given; see `on_cluster`."""
+def running_on(cluster: str | None) -> Iterator[int]:
+    """Run the blasts of this block on a cluster, if one is given; see `on_cluster`.
+
+    Yields:
+        Number of the cluster's threads now; 1 without a cluster.
+    """
     if cluster is None:
-        yield
+        yield 1
         return
     # Dask logs the fate of its workers; `on_cluster` turns serious losses into errors.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -146,7 +150,7 @@ def running_on(cluster: str | None) -> Iterator[None]:
         now = f"{size.workers} workers with {size.threads} threads now"
         text = f"cluster {cluster}: {now if size.workers else 'waits for the first worker'}"
         message_console().print(printable(text))
-        yield
+        yield max(size.threads, 1)
 
 
 def resume_words(cache: Path | None) -> str:

@@ -51,6 +51,7 @@ from blast_env.design.search import (
     find_proposer,
     layouts_by_rule,
     proposers,
+    widened,
 )
 from blast_env.design.search.by_rule import DEFAULT_BUDGET, ProposerKind
 from blast_env.design.search.package import PackageProposer
@@ -93,7 +94,7 @@ _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out",
 
 _WITH_BLASTS: Final = (
     *("budget", "seed", "threat", "threats", "risk", "engine"),
-    *("cell_m", "start_from", "surrogate", "held_out", "cluster", "cache"),
+    *("cell_m", "start_from", "surrogate", "held_out", "cluster", "width", "cache"),
 )
 """Options of the searches by blasts alone."""
 
@@ -148,6 +149,13 @@ def search(
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
     cluster: ClusterAddress = None,
+    width: int | None = typer.Option(
+        None,
+        help="Blasts that run at the same time, for the walkers of population_annealing. The "
+        "layout depends on it.",
+        show_default="the threads of the cluster, else 1",
+        min=1,
+    ),
     cache: CacheOption = None,
 ) -> None:
     """Search for the layout with the least load on the protected structures.
@@ -169,11 +177,13 @@ def search(
     if verify:
         raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
     refuse_given(context, *_OF_OTHER_THREAT[threat])
-    with running_on(cluster), resumable(resume_words(cache)):
+    with running_on(cluster) as threads_now, resumable(resume_words(cache)):
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)
         proposer, digest = _method(method, site, start_from, surrogate)
+        own_width = threads_now if width is None else width
+        proposer = widened(proposer, own_width)
         known = None if threat == "hidden" else _known_charge(site, given, seed)
         own_risk = find_risk(risk, CVAR_LEVEL)
         problem = search_problem(
@@ -189,7 +199,8 @@ def search(
         checked = _check(run, held_out, is_hidden=threat == "hidden")
         print_parts(search_answer(run, checked))
         if out is not None:
-            _write_search(run, _options(context, run, digest), checked, out)
+            options = _options(context, run, digest) | {"width": own_width}
+            _write_search(run, options, checked, out)
     if run.result.interrupted:
         raise InterruptedCommandError(
             "the best layout so far was kept",

@@ -13,11 +13,13 @@ from blast_env.design.search import (
     Layout,
     PopulationAnnealingSearch,
     ProposerKind,
+    RandomSearch,
     SearchResult,
     SurrogateSearch,
     find_proposer,
     layouts_by_rule,
     proposers,
+    widened,
 )
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
@@ -288,3 +290,17 @@ def test_annealing_takes_what_is_far_better_and_ends_where_nothing_is_left(share
     result = search.propose(problem, 60, 0)
     assert problem.load(result.layout) <= 0.5 ** len(result.layout) * problem.load(())
     assert len(result.layout) > 1 or share == 0.0
+
+
+@pytest.mark.parametrize(("width", "walkers"), [(1, 4), (6, 6), (1000, 10)])
+def test_more_workers_get_more_walkers_as_far_as_each_makes_eight_moves(
+    width: int, walkers: int
+) -> None:
+    batches: list[int] = []
+    evaluator = WatchedEvaluator(small_scenario(), lambda asked: batches.append(len(asked)))
+    problem = small_problem(evaluator, realisations=1)
+    found = widened(PopulationAnnealingSearch(from_rules=False), width)
+    assert isinstance(found, PopulationAnnealingSearch)
+    found.propose(problem, budget=80)
+    assert 0.7 * walkers < max(batches[1:]) <= walkers  # some neighbours are known or equal
+    assert widened(RandomSearch(), width) == RandomSearch()

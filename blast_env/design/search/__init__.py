@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         SamplingAgent,
         SearchResult,
     )
-    from blast_env.design.search.registry import find_proposer, proposers
+    from blast_env.design.search.registry import find_proposer, proposers, widened
     from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
     from blast_env.evaluation import DesignProblem
     from blast_env.geometry import Layout
@@ -89,4 +89,5 @@ __all__ = [
     "random_walls",
     "repaired",
     "search_by",
+    "widened",
 ]

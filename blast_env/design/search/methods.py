@@ -64,6 +64,7 @@ class Cooling:
 
 _LEAST_WALKERS: Final = 3
 _MOST_WALKERS: Final = 16
+_LEAST_MOVES: Final = 8
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,8 @@ class PopulationAnnealingSearch(Search):
         exchanged_share: Share of the walkers that restart from the best ones at an exchange.
         hot: Initial temperature, relative to the load of the best initial walker.
         cold: Final temperature, relative to the same load.
+        width: Number of blasts that can run at the same time: there are at least as many walkers
+            as they keep at work, as far as each makes eight moves.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -93,6 +96,7 @@ class PopulationAnnealingSearch(Search):
     exchanged_share: float = 0.34
     hot: float = 0.02
     cold: float = 0.001
+    width: int = 1
     name: str = "population_annealing"
 
     def explore(self, session: SearchSession) -> None:
@@ -102,6 +106,8 @@ class PopulationAnnealingSearch(Search):
         # walkers; (3) walk.
         walkers = round(0.4 * plan.exploring_layouts**0.5)
         walkers = int(np.clip(walkers, _LEAST_WALKERS, _MOST_WALKERS))
+        wide = min(-(-self.width // plan.threats), plan.exploring_layouts // _LEAST_MOVES)
+        walkers = max(walkers, wide)
         count = max(walkers, round(self.starting_share * plan.exploring_layouts))
         initial = [*self.initial, *(rule_layouts(session.problem) if self.from_rules else ())]
         count = max(count - len(initial), 0)

@@ -107,5 +107,22 @@ def find_proposer(name: str, initial: tuple[Layout, ...] = ()) -> Proposer:
     return begun
 
 
+def widened(proposer: Proposer, width: int) -> Proposer:
+    """Return a proposer that keeps more workers busy, if it is a search with a width.
+
+    Args:
+        proposer: The proposer.
+        width: Number of blasts that can run at the same time; the result depends on it.
+    """
+    if not _has_field(proposer, "width"):
+        return proposer
+    wide: Proposer = replace(proposer, width=width)  # type: ignore[type-var]
+    return wide
+
+
 def _begins_with_layouts(proposer: Any) -> bool:
-    return is_dataclass(proposer) and "initial" in {field.name for field in fields(proposer)}
+    return _has_field(proposer, "initial")
+
+
+def _has_field(proposer: Any, name: str) -> bool:
+    return is_dataclass(proposer) and name in {field.name for field in fields(proposer)}
