@@ -181,7 +181,7 @@ def _of_rules(
 ) -> FloatArray:
     """Return values of the rules of each placement (placements, n), or of all if equal (1, n)."""
     rules = placements.rules
-    distinct = {id(rule): rule for rule in rules}
+    distinct = dict(zip(map(id, rules), rules, strict=True))
     known = np.array([values(item) for item in distinct.values()], dtype=np.float64)
     if len(distinct) == 1:
         return known

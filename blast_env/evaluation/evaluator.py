@@ -280,18 +280,22 @@ def loads_together(
     # in the order asked for.
     check_workers("processes", processes)
     distinct: dict[BlastKey, int] = {}  # a hash of a key takes as long as a step of a layout
-    numbers, found = list[int](), list[BlastLoads | None]()
+    numbers: list[int] = []
+    found: dict[int, BlastLoads] = {}
     missing: dict[int, tuple[BlastKey, BlastEvaluator, EngineBlast]] = {}
     for evaluator, layout, threat in asked:
         key = evaluator.key(layout, threat)
-        number = distinct.setdefault(key, len(found))
+        number = distinct.setdefault(key, len(distinct))
         numbers.append(number)
-        if number == len(found):
-            found.append(evaluator.store.get(key, evaluator.scenario))
-            if found[number] is None:
-                # The charge, or the vehicle that carries it to the place in the key.
-                blast = EngineBlast(evaluator.scenario, key.layout, threat.charge, key.seed)
-                missing[number] = key, evaluator, blast
+        if number in found or number in missing:
+            continue
+        known = evaluator.store.get(key, evaluator.scenario)
+        if known is None:
+            # The charge, or the vehicle that carries it to the place in the key.
+            blast = EngineBlast(evaluator.scenario, key.layout, threat.charge, key.seed)
+            missing[number] = key, evaluator, blast
+        else:
+            found[number] = known
     places = list(missing)
     for done, (index, loads) in enumerate(_run(list(missing.values()), processes), start=1):
         found[places[index]] = loads
@@ -299,9 +303,8 @@ def loads_together(
             progress(1.0 - (len(missing) - done) / len(numbers))
     if asked:
         asked[0][0].counts.cache_hits += len(numbers) - len(missing)
-    known = [loads for loads in found if loads is not None]
     return [
-        evaluator.responding(known[number], layout)
+        evaluator.responding(found[number], layout)
         for number, (evaluator, layout, _) in zip(numbers, asked, strict=True)
     ]
 
