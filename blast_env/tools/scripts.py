@@ -15,15 +15,22 @@ Values = dict[str, Any]
 Script = Generator[tuple[str, Values], Values, float]
 
 
+def submitted(layout: list[Values]) -> Script:
+    """Submit a layout."""
+    found = yield from _waited("submit", layout)
+    score: float = found["score"]["score"]
+    return score
+
+
 def nothing() -> Script:
     """Submit no barrier."""
-    return (yield from _submitted([]))
+    return (yield from submitted([]))
 
 
 def random() -> Script:
     """Submit the random layout."""
     found = yield "rules", {}
-    return (yield from _submitted(found["proposals"][-1]["layout"]))
+    return (yield from submitted(found["proposals"][-1]["layout"]))
 
 
 def rules() -> Script:
@@ -35,7 +42,7 @@ def rules() -> Script:
 def guesses() -> Script:
     """Guess what the rules propose, and submit the best by guess."""
     layouts = yield from _by_guess()
-    return (yield from _submitted(layouts[0]))
+    return (yield from submitted(layouts[0]))
 
 
 def rules_guesses_blasts() -> Script:
@@ -101,13 +108,7 @@ def _best_of_blasts(layouts: list[list[Values]]) -> Script:
         left, share = found["blasts_left"], found["blast"]["share"]
         if share < best_share:
             best, best_share = [layout], share
-    return (yield from _submitted(best[0] if best else []))
-
-
-def _submitted(layout: list[Values]) -> Script:
-    found = yield from _waited("submit", layout)
-    score: float = found["score"]["score"]
-    return score
+    return (yield from submitted(best[0] if best else []))
 
 
 def _waited(tool: str, layout: list[Values]) -> Generator[tuple[str, Values], Values, Values]:

@@ -185,6 +185,8 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.check_sites --family item_sites --sites 12 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": "--sites 2 --random-layouts 2",
+    "python -m studies.tools_table --problem control_room-known-v2 --problem"
+    " hotel_forecourt-known-v2": "--budget 1 --cell 0.5",
     # docs/studies
     "python -m studies.engines": "--seeds 3 --scene courtyard",
     "python -m studies.bench --repeats 3": (
@@ -203,6 +205,11 @@ SMALLER: Final[dict[str, str]] = {
 """Options that are appended to studies and trainings of minutes to hours."""
 
 NOT_RUN: Final[dict[str, str]] = {
+    "blast-env serve --mcp --problem control_room-known-v2 --budget 4": (
+        "needs mcp; tests/tools/test_mcp_door.py"
+    ),
+    "blast-env serve --mcp --http --port 8081": "needs mcp; tests/tools/test_mcp_door.py",
+    "blast-env serve --openenv --port 8082": ("needs OpenEnv; tests/tools/test_openenv_door.py"),
     "python -m studies.offline_data --scenario control_room --episodes 20": (
         "needs Minari, and so JAX"
     ),
