@@ -37,6 +37,7 @@ from blast_env.layout import write_layout
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge, PointSource, Scenario, load_scenario, save_scenario
 from tests.app.here import Here
+from tests.blasts import soon_growing_cells
 from tests.figures import undrawn_figures
 
 LARGE: Final = ("campus", "car_park", "government_forecourt", "street_front")
@@ -49,10 +50,13 @@ GLASS, WALL = "window_laminated_6", "concrete_200"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _undrawn() -> Iterator[None]:
-    """Leave figures empty, and draw few of the uncertain quantities: no probability is compared."""
+def _quick() -> Iterator[None]:
+    """Leave figures empty, draw few of the uncertain quantities, and let cells grow soon.
+
+    No probability is compared, and one road serves all cells.
+    """
     few = partial(level_probability, draws=20)
-    with undrawn_figures(), pytest.MonkeyPatch.context() as patch:
+    with undrawn_figures(), soon_growing_cells(), pytest.MonkeyPatch.context() as patch:
         for module in (assess, compare, summary):
             patch.setattr(module, "level_probability", lambda judged, known, *_: few(judged, known))
         yield
@@ -144,10 +148,7 @@ def row_of(text: str, *words: str) -> str:
     )
 
 
-@pytest.mark.parametrize(
-    "name",
-    [*COARSE, *WITH_ERRORS, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)],
-)
+@pytest.mark.parametrize("name", [*COARSE, *WITH_ERRORS, *LARGE])
 def test_all_doors_say_the_same(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = Asked.on(name, tmp_path)
     options = StudyOptions(

@@ -1,14 +1,32 @@
 """`blast-env judge --run`, the score of a trained agent, run in this process."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from blast_agents.training import load_agent, train
 
 from blast_env.benchmark import SubmissionJudgement, site_problems
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.layout import check_layout
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
+from tests.blasts import soon_growing_cells
 from tests.cli.running import run
+
+
+@pytest.fixture(autouse=True)
+def _quick_blasts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Run all blasts of gas on cells that grow soon: no load is compared with others."""
+    start = GasBlast.start
+
+    def quick(self: GasBlast, *arguments: Any) -> Any:
+        return start(replace(self, engine=GasEngine(cells="coarse")), *arguments)
+
+    monkeypatch.setattr(GasBlast, "start", quick)
+    with soon_growing_cells():
+        yield
 
 
 def judged_agent(folder: Path, site: Path, *given: Any, **changes: Any) -> SubmissionJudgement:
