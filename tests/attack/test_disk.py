@@ -72,7 +72,7 @@ def _figure(path: Path) -> None:
 
 
 def _film(path: Path) -> None:
-    write_film(_blast(), path, frames_per_s=5.0, slow_motion=40.0, width_px=320)
+    write_film(_blast(), path, frames_per_s=5.0, slow_motion=10.0, width_px=320)
 
 
 class _Corridor(gymnasium.Env[np.ndarray, int]):
@@ -198,14 +198,20 @@ def in_process(work: Callable[[Path], None], folder: Path, kill_at: int = -1) ->
     return process.exitcode or 0, steps.value
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-def test_training_goes_on_after_a_kill(tmp_path: Path, share: float) -> None:
-    """Every checkpoint that it leaves is whole, and the last one is where the run goes on."""
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    code, steps = in_process(training, whole)
+@pytest.fixture(scope="module")
+def steps(tmp_path_factory: pytest.TempPathFactory) -> int:
+    """The number of steps of a training that is not killed."""
+    code, steps = in_process(training, tmp_path_factory.mktemp("whole"))
     assert code == 0
     assert steps > 10
+    return steps
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_training_goes_on_after_a_kill(steps: int, tmp_path: Path, share: float) -> None:
+    """Every checkpoint that it leaves is whole, and the last one is where the run goes on."""
+    killed = tmp_path / "killed"
     assert in_process(training, killed, int(share * steps))[0] == -signal.SIGKILL
     folder = RunFolder(killed / "run")
     before = {path: path.read_bytes() for path in folder.checkpoints.values()}

@@ -13,7 +13,7 @@ from gymnasium.wrappers import HumanRendering, RecordVideo
 import blast_env  # noqa: F401  # registers
 from tests.envs.small import make, play
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("drawn")]
 
 FINISH = 40
 

@@ -250,6 +250,7 @@ def test_gas_repeats_exactly_and_pickles(gas_episode: tuple[list[Any], list[floa
         assert all((one[name] == other[name]).all() for name in one)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_it_keeps_gymnasium_s_rules_and_shows_the_overpressure() -> None:
     env = gas(render_mode="rgb_array", step_s=0.05)
     check_env(env, skip_render_check=True)
