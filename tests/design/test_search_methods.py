@@ -99,7 +99,7 @@ def test_the_number_of_processes_changes_nothing(problem: DesignProblem) -> None
 
 
 @pytest.mark.parametrize("name", DRAWN)
-@pytest.mark.parametrize("budget", [1, 2, 7, 33])
+@pytest.mark.parametrize("budget", [1, 7, 33])
 def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) -> None:
     """Distinct pairs that were asked for; nearly all of the budget is spent."""
     asked: list[tuple[Layout, LoadCase]] = []
