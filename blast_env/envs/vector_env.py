@@ -19,7 +19,7 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.store import BlastStore
 from blast_env.values import whole_number
 
-_LOADS_EACH: Final = 64
+_LOADS_EACH: Final = 16
 """Number of loads in memory per environment."""
 
 

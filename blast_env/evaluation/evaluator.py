@@ -241,7 +241,8 @@ class BlastEvaluator:
         # Without noise the seed has no effect: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)
-        return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
+        site, *_, engine, calibration, code, parts = self._key_of_nothing
+        return BlastKey(site, cells, charge, seed, engine, calibration, code, parts)
 
     def _keep(self, key: BlastKey, record: BlastRecord) -> None:
         """Count and store a blast."""
@@ -262,7 +263,8 @@ def _run(
     for lot, of_lot in as_completed(engine.loads_at_once, work, processes):
         for index, loads in enumerate(of_lot, start=firsts[lot]):
             key, evaluator, _ = asked[index]
-            evaluator._keep(key, BlastRecord(loads))
+            evaluator.counts.blasts += 1
+            evaluator.store.add(key, loads)
             yield index, loads
 
 

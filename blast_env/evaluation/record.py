@@ -9,7 +9,7 @@ a level is reached, or how likely a house is damaged, is a question
 import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
@@ -135,6 +135,14 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     )
 
 
+@cache
+def _nothing() -> NDArray[np.float64]:
+    """Return an array without numbers, read-only: to make one takes as long as to keep loads."""
+    nothing = np.zeros(0)
+    nothing.flags.writeable = False
+    return nothing
+
+
 @dataclass(frozen=True, eq=False)
 class BlastLoads:
     """The loads of one blast on all structures, without the barrier.
@@ -150,9 +158,9 @@ class BlastLoads:
     """
 
     structures: tuple[StructureLoad, ...]
-    module_impulse_n_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    module_impulse_n_s: NDArray[np.float64] = field(default_factory=_nothing)
     bays: tuple[BayDamage, ...] = ()
-    module_impulse_sim: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    module_impulse_sim: NDArray[np.float64] = field(default_factory=_nothing)
 
     def with_facades(
         self, named: Collection[BayComponents], objective: ObjectiveSection
@@ -462,7 +470,7 @@ class BlastRecord:
     loads: BlastLoads
     details: BlastDetails | None = None
     bays: tuple[str, ...] = ()
-    time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    time_s: FloatArray = field(default_factory=_nothing)
     pressure_pa: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     pieces: "pd.DataFrame | None" = None
     taken_away: Layout = ()

@@ -88,7 +88,10 @@ class BlastStore:
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast, which may displace others."""
-        self.keep(key, BlastRecord(loads))
+        if self._file is None:
+            self.remember(key, loads)
+        else:
+            self.keep(key, BlastRecord(loads))
 
     def keep(self, key: BlastKey, record: BlastRecord) -> None:
         """Keep the record of a blast, which may displace others."""
