@@ -1,9 +1,11 @@
-"""PPO and MaskablePPO with the defaults of their libraries on the default site, beside the rules.
+"""PPO and MaskablePPO with the defaults of their libraries on a site, beside the rules.
 
-`python -m studies.first_hour` prints the table of docs/researchers/training.md.
+`python -m studies.first_hour` prints the tables of docs/researchers/training.md.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from time import process_time
 from typing import Annotated, Any, Final
 
@@ -19,8 +21,10 @@ from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import mean_estimate
+from blast_env.surrogate.engine import engine_to_train_on
 
 HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
@@ -31,24 +35,48 @@ KNOWN: Final[dict[str, type[Agent]]] = {
 }
 
 
-def environment(
-    action: str, engine: str = "event", realisations: int | None = None, cache: str | None = None
-) -> BlastBarrierEnv:
-    """Return the default site with what the page recommends, apart from the action space."""
-    return BlastBarrierEnv(
-        reward="relative",
-        observation="features",
-        action=action,
-        engine=engine,
-        realisations=realisations,
-        cache=BlastStore(cache, size=8192),
-    )
+@dataclass(frozen=True)
+class Setting:
+    """What is learnt on; observations are the vector `"features"`.
+
+    Attributes:
+        scenario: The site.
+        engine: The engine of the training.
+        reward: The reward.
+        action: The action space.
+    """
+
+    scenario: str
+    engine: str
+    reward: str
+    action: str
+
+    def environment(
+        self, engine: Engine, realisations: int | None = None, cache: str | None = None
+    ) -> BlastBarrierEnv:
+        """Return the environment with an engine."""
+        return BlastBarrierEnv(
+            self.scenario,
+            reward=self.reward,
+            observation="features",
+            action=self.action,
+            engine=engine,
+            realisations=realisations,
+            cache=BlastStore(cache, size=8192),
+        )
+
+    @cached_property
+    def training(self) -> Engine:
+        """The engine of the training; the surrogate's guesses are at their safe end."""
+        return engine_to_train_on(self.engine)
 
 
-def trained(algorithm: str, action: str, steps: int, seed: int) -> Agent:
-    """Return an agent of the library's defaults, on 128 threats."""
-    pool: gym.Env[Any, Any] = ThreatPool(environment(action, realisations=1), 128, seed)
-    agent: Agent = KNOWN[algorithm]("MlpPolicy", pool, seed=seed, device="cpu")
+def trained(algorithm: str, setting: Setting, steps: int, seed: int) -> Agent:
+    """Return an agent of the library's defaults; a noisy engine has 128 threats, met again."""
+    env: gym.Env[Any, Any] = setting.environment(setting.training, realisations=1)
+    if setting.training.has_noise:
+        env = ThreatPool(env, 128, seed)
+    agent: Agent = KNOWN[algorithm]("MlpPolicy", env, seed=seed, device="cpu")
     agent.learn(steps)
     return agent
 
@@ -68,7 +96,7 @@ def reductions(env: BlastBarrierEnv, agent: Agent | int | None, seeds: Sequence[
                 action, _ = agent.predict(observation, deterministic=True, action_masks=masks)
             elif isinstance(agent, PPO):
                 action, _ = agent.predict(observation, deterministic=True)
-            observation, _, ended, _, info = env.step(np.int64(action))
+            observation, _, ended, _, info = env.step(action)
         found.append(info["reduction"])
     return np.array(found)
 
@@ -78,11 +106,11 @@ def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, 
     found: dict[str, list[float]] = {}
     for seed in seeds:
         env.reset(seed=seed)
-        scenario = env.placement.scenario
-        (charge,) = env.step(env.action_space.n - 1)[-1]["charges"]  # type: ignore[attr-defined]
+        scenario, finish = env.placement.scenario, env.placement.catalogue.finish
+        (charge,) = env.step(finish)[-1]["charges"]
         for name, layout in layouts_by_rule(scenario, charge).items():
             env.reset(seed=seed, options={"layout": layout})
-            *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+            *_, info = env.step(finish)
             found.setdefault(name, []).append(info["reduction"])
     for name, item in found.items():
         yield name, np.array(item)
@@ -103,6 +131,9 @@ def main(
     algorithm: Annotated[
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
+    scenario: Annotated[str, typer.Option(help="The site.")] = "courtyard",
+    engine: Annotated[str, typer.Option(help="Engine of the training.")] = "event",
+    reward: Annotated[str, typer.Option(help="Reward.")] = "terminal",
     action: Annotated[str, typer.Option(help="Action space.")] = "row",
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
@@ -111,25 +142,33 @@ def main(
 ) -> None:
     """Train, and judge on held-out threats; print one line for each rule and agent."""
     torch.set_num_threads(1)
+    setting = Setting(scenario, engine, reward, action)
     agents: dict[str, Agent] = {}
     for kind in algorithm or KNOWN:
         for seed in range(seeds):
             began_s = process_time()
-            agent = trained(kind, action, steps, seed)
+            agent = trained(kind, setting, steps, seed)
             agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
-    for engine, judged in (("event", HELD_OUT[:threats]), ("gas", HELD_OUT[:by_gas])):
-        if judged:
-            print_line(f"judged by {engine} on {len(judged)} threats")
-            judge = environment(action, engine, cache=cache if engine == "gas" else None)
-            rules = dict(by_rules(judge, judged))
-            best = max(rules.values(), key=lambda rule: float(rule.mean()))
-            for name, rule in rules.items():
-                report(name, rule)
-            report("the nearest row again and again", reductions(judge, 0, judged), best)
-            if engine == "event":
-                report("random", reductions(environment("place"), None, judged))
-            for name, agent in agents.items():
-                report(name, reductions(judge, agent, judged), best)
+    for judge, judged in (
+        (setting.training, HELD_OUT[:threats]),
+        (find_engine("gas"), HELD_OUT[:by_gas]),
+    ):
+        if not judged:
+            continue
+        print_line(f"judged by {judge.name} on {len(judged)} threats")
+        kept = cache if judge.name == "gas" else None
+        env = setting.environment(judge, cache=kept)
+        flat = replace(setting, action="place").environment(judge, cache=kept)
+        rules = dict(by_rules(flat, judged))
+        best = max(rules.values(), key=lambda rule: float(rule.mean()))
+        for name, rule in rules.items():
+            report(name, rule)
+        if action == "row":
+            report("the nearest row again and again", reductions(env, 0, judged), best)
+        if judge is setting.training:
+            report("random", reductions(flat, None, judged))
+        for name, agent in agents.items():
+            report(name, reductions(env, agent, judged), best)
 
 
 if __name__ == "__main__":

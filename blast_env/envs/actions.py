@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
@@ -14,6 +15,85 @@ from blast_env.site import AnySource, Catalogue, Scenario
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import whole_number
+
+
+class ActionCode(Protocol):
+    """How agents write the numbered actions: as a number, or as a vector of numbers."""
+
+    @property
+    def space(self) -> spaces.Space[Any]:
+        """The space of one action."""
+
+    def numbers(self, actions: NDArray[np.int64]) -> IntArray:
+        """Return the numbers of actions of the space (actions,)."""
+
+    def masks(self, legal: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the masks of the space, one per row of the mask of numbered actions."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """An action is its number.
+
+    Attributes:
+        count: Number of actions.
+    """
+
+    count: int
+
+    @property
+    def space(self) -> spaces.Space[Any]:
+        """`Discrete`."""
+        return spaces.Discrete(self.count)
+
+    def numbers(self, actions: NDArray[np.int64]) -> IntArray:
+        """Return the actions."""
+        return actions
+
+    def masks(self, legal: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the masks."""
+        return legal
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """An action is a variant, or the end, with a row and a column, each chosen by itself.
+
+    A mask says of each dimension which values some legal action has, one after the other, as
+    MaskablePPO takes it. Values that are legal one by one may be illegal together.
+
+    Attributes:
+        variants: Number of variants; this number itself finishes.
+        rows: Number of rows of the build zone.
+        columns: Number of its columns.
+    """
+
+    variants: int
+    rows: int
+    columns: int
+
+    @property
+    def space(self) -> spaces.Space[Any]:
+        """`MultiDiscrete`."""
+        return spaces.MultiDiscrete([self.variants + 1, self.rows, self.columns])
+
+    def numbers(self, actions: NDArray[np.int64]) -> IntArray:
+        """Return the numbers of actions (actions, 3) among placements row by row; the last ends."""
+        variant, row, column = actions.T
+        placed = (variant * self.rows + row) * self.columns + column
+        numbers: IntArray = np.minimum(placed, self.variants * self.rows * self.columns)
+        return numbers
+
+    def masks(self, legal: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the masks (actions, variants + 1 + rows + columns).
+
+        Where nothing can be placed, any row and column go with the end.
+        """
+        places = legal[:, :-1].reshape(-1, self.variants, self.rows, self.columns)
+        of_variants = np.hstack((places.any(axis=(2, 3)), legal[:, -1:]))
+        nothing = ~places.any(axis=(1, 2, 3), keepdims=True).reshape(-1, 1)
+        of_rows, of_columns = places.any(axis=(1, 3)), places.any(axis=(1, 2))
+        return np.hstack((of_variants, of_rows | nothing, of_columns | nothing)).astype(np.int8)
 
 
 class Actions(Protocol):
@@ -30,9 +110,20 @@ class Actions(Protocol):
             to the line of sight is taken.
         """
 
+    def code(self, catalogue: Catalogue, count: int) -> ActionCode:
+        """Return how agents write the actions, of which there are `count`."""
+
+
+class _Numbered:
+    """Actions that agents write as numbers."""
+
+    def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
+        """Return their numbers."""
+        return Numbers(count)
+
 
 @dataclass(frozen=True)
-class PlaceAtOnce:
+class PlaceAtOnce(_Numbered):
     """One action per placement: a variant and its lower left cell, as `Catalogue` numbers them."""
 
     def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
@@ -42,7 +133,24 @@ class PlaceAtOnce:
 
 
 @dataclass(frozen=True)
-class ItemThenPlace:
+class PlaceByDimensions:
+    """The same placements as `PlaceAtOnce`, as a vector: the variant or the end, row, column.
+
+    Policies of libraries draw each number by itself: some dozens of outputs take the place of
+    thousands, and what is learnt of a row holds for all columns.
+    """
+
+    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
+        """Return the only choice, that of `PlaceAtOnce`."""
+        return PlaceAtOnce().choices(scenario)
+
+    def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
+        """Return the three numbers of a placement."""
+        return Dimensions(len(catalogue.variants), *catalogue.shape)
+
+
+@dataclass(frozen=True)
+class ItemThenPlace(_Numbered):
     """First the variant (an item in one orientation), then the place of its lower left cell.
 
     In a zone without a catalogue only the place is chosen.
@@ -73,7 +181,7 @@ class ItemThenPlace:
 
 
 @dataclass(frozen=True)
-class RowAcrossSight:
+class RowAcrossSight(_Numbered):
     """The variant and a row of cells across the line of sight, without the place in it.
 
     A row is a column or a row of the build zone: whichever lies more across the line from the mean
@@ -144,6 +252,7 @@ def _mean(places_m: Sequence[tuple[float, float]], weights: Sequence[float]) -> 
 ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
     {
         "place": PlaceAtOnce(),
+        "dimensions": PlaceByDimensions(),
         "item_then_place": ItemThenPlace(),
         "item_then_block": ItemThenPlace(block_cells=8),
         "row": RowAcrossSight(),

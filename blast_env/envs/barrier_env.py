@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from blast_env.arrays import IntArray
 from blast_env.envs.actions import ACTIONS, Actions
 from blast_env.envs.arguments import (
     PlainSpec,
@@ -60,7 +61,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
     orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
     action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
-    legal. With `action="item_then_place"` or `"item_then_block"` the variant comes before the cell.
+    legal. With `action="dimensions"` it is `MultiDiscrete([variants + 1, rows, columns])`, where
+    the last variant finishes. With `"item_then_place"` or `"item_then_block"` the variant comes
+    before the cell.
     `action="row"` has few actions: a variant and a row across the line of sight, whose legal place
     nearest to the line is taken.
     An illegal action places the same item on the nearest legal cell (`invalid_action="nearest"`).
@@ -72,12 +75,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     `blast_env.envs.observations` lists all values.
 
     ## Rewards
-    The rewards of an episode add up to minus the weighted impulse on the protected structures
-    (psi s; psi for peaks) and the cost of illegal actions. `info["reward_terms"]` has the terms.
-    `reward="terminal"` pays when the charge goes off. Its first step costs a deposit of twice the
-    impulse without a barrier, returned at the end, so that truncation never pays. With
-    `"incremental"` each module pays its reduction at once. With `"relative"` the end pays
-    `info["reduction"]`, of the order of 1 on every site: the one to train with.
+    The rewards of an episode add up to minus the weighted impulse on the protected structures, as
+    a share of that without a barrier, and the cost of illegal actions. `info["impulse_psi_s"]` has
+    it in the paper's unit, `info["reward_terms"]` the terms. With `reward="terminal"` the first
+    step pays -1, the impulse without a barrier; when the charge goes off, what the layout takes off
+    comes back. So truncation pays as much as no barrier. With `"incremental"` each module pays its
+    reduction at once. With `"relative"` there is no -1: the end pays `info["reduction"]`.
 
     ## Starting state
     The build zone is empty. `threat="visible"` draws one charge and shows it; `"hidden"` draws
@@ -103,8 +106,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     >>> for row in (10, 12, 14, 16, 22, 24, 26, 28):
     ...     for cell in ((row, 0), (row + 1, 0)):
     ...         observation, reward, ended, _, info = env.step(cell[0] * 16 + cell[1])
-    >>> ended, info["reward_terms"]["impulse"] == -info["impulse_psi_s"], info["reduction"] > 0.0
-    (True, True, True)
+    >>> ended, info["reward_terms"]["impulse"] == info["reduction"] > 0.0
+    (True, True)
 
     ## Version history
     - v0: first version. Since 2026-11: `invalid_action`; before, as `"penalty"`.
@@ -146,7 +149,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
             observation: `"image"`, `"grid"`, `"features"`, `"dict"`, or an `Observation`.
-            action: `"place"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or `Actions`.
+            action: `"place"`, `"dimensions"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or
+                `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.
             realisations: Number of blasts per charge; default 2 for a visible charge, 1 for
@@ -157,7 +161,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             invalid_action: `"nearest"` or `"penalty"`: whether the nearest legal place of the same
                 item takes the place of an illegal one.
             invalid_action_cost: Cost of an illegal action without effect, in the unit of the
-                reward; 0.001 psi s are 6.9 Pa s.
+                reward: 0.001 is a thousandth of the impulse without a barrier.
             invalid_action_limit: Number of illegal actions without effect that ends the episode.
             engine: Name of an engine, or an engine; by default `"event"`, the paper's model, and
                 `"gas"` for sites that state heights. `"event"` and `"pymunk"` are for studying that
@@ -196,11 +200,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             store=BlastStore.of(cache),
         )
         self.episodes = Episodes(self.task, 1)
-        numbered = self.episodes.site_of(representative).actions
-        self.action_space = spaces.Discrete(numbered.finish + 1)
+        self.action_space = self.episodes.code.space
         self.observation_space = self.task.observation.space(representative)
         if isinstance(self.observation_space, spaces.Dict):
-            mask = spaces.MultiBinary(numbered.finish + 1)
+            mask = spaces.MultiBinary(spaces.flatdim(self.action_space))
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
         self._display: Display | None = None
         if render_mode is not None:
@@ -222,7 +225,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         self._show()
         return self._observation(), self.episodes.information(0)
 
-    def step(self, action: np.int64 | int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: np.int64 | int | IntArray
+    ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Make a choice, place a module or a piece, or finish; see the class.
 
         Raises:
@@ -230,7 +235,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             gymnasium.error.ResetNeeded: If `reset` has not been called, or the episode has ended.
         """
         self._check(action)
-        self.episodes.place([0], [int(action)])
+        self.episodes.place([0], self.episodes.code.numbers(np.array([action])))
         self.episodes.blast()
         observation = self._observation()
         reward = float(self.episodes.rewards([0])[0])
@@ -239,7 +244,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         self._show()
         return observation, reward, terminated, False, info
 
-    def _check(self, action: np.int64 | int) -> None:
+    def _check(self, action: np.int64 | int | IntArray) -> None:
         if not self.action_space.contains(action):
             raise gym.error.InvalidAction(
                 f"action is {value_text(action)}, must be in {self.action_space}"
@@ -251,7 +256,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         return one_of(self.episodes.observe([0], self.observation_space), 0)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return the mask of actions that are legal now, (actions,).
+        """Return the mask of actions that are legal now, (actions,); see `ActionCode.masks`.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.

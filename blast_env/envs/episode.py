@@ -354,6 +354,7 @@ class Episodes:
 
     Attributes:
         task: The task.
+        code: How agents write actions.
         layouts: The layouts, in arrays.
         running: Each episode; empty before the first `begin`.
         ended: Whether the charge of each has gone off (episodes,).
@@ -365,6 +366,8 @@ class Episodes:
         self._sites: OrderedDict[int, _Site] = OrderedDict()
         self._most_sites = max(count, 4)
         first = self.site_of(task.source.representative)  # an unsuitable engine fails here
+        catalogue = task.source.representative.zone.catalogue
+        self.code = task.actions.code(catalogue, first.actions.finish + 1)
         self.layouts = LayoutBatch(first.empty, first.rules, count)
         self.ended: BoolArray = np.zeros(count, dtype=np.bool_)
         self._begins: BoolArray = np.ones(count, dtype=np.bool_)  # the last action was the first
@@ -597,7 +600,7 @@ class Episodes:
         return observed
 
     def masks(self, indices: Sequence[int]) -> NDArray[np.int8]:
-        """Return the masks of legal actions (episodes, actions), as `sample(mask=...)` wants them.
+        """Return the masks of legal actions (episodes, length), as the code of actions has them.
 
         When the charge has gone off, only finishing is legal.
         """
@@ -614,7 +617,7 @@ class Episodes:
                 masks[position] = of_episode.mask(self._choice(index))
         over = self.ended[list(indices)]
         masks[over, :-1], masks[over, -1] = 0, 1
-        return masks
+        return self.code.masks(masks)
 
     def information(self, index: int) -> dict[str, Any]:
         """Return the information after `reset` and after every action.

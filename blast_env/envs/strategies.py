@@ -237,53 +237,52 @@ class OccasionalReward(Reward, Protocol):
         """Return in which turns it may pay (turns,); see `Transition` for the arguments."""
 
 
-DEPOSIT: Final = 2.0
-"""Deposit as a multiple of the load without a barrier: more than the load with any layout."""
+UNPROTECTED: Final = "unprotected"
+"""The name of the term with the load without a barrier."""
 
 
 @dataclass(frozen=True)
 class TerminalReward:
-    """Minus the load with the whole layout, paid when the charge goes off.
+    """Minus the load with the whole layout, in units of the load without a barrier.
 
-    The load is that of the scenario's objective, by default the impulse.
+    The load is that of the scenario's objective, by default the impulse. The first action pays -1,
+    the load without a barrier. When the charge goes off, what the layout takes off comes back. So a
+    truncated episode pays as much as one without a barrier.
 
-    The first action also costs a deposit, which is returned when the charge goes off: a truncated
-    episode loses it. It exceeds the load with any layout, so that finishing always pays more than
-    truncation.
+    Critics of libraries start with values of the order of 1, beside which some hundredths of a
+    psi s do not count: hence the unit (docs/researchers/training.md).
     """
 
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
-        """Return `impulse` (psi s), `peak` (psi), `load` (both) or `response`, and `deposit`."""
-        return scenario.objective.term, "deposit"
+        """Return `unprotected`, and `impulse`, `peak`, `load` (both) or `response`, taken off."""
+        return UNPROTECTED, scenario.objective.term
 
     def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:
         """Return the turns at the beginning and at the end."""
         return begins | ended
 
-    def layouts(self, transition: Transition) -> Sequence[Layout]:
-        """Return no barrier, at the beginning."""
-        return ((),) if transition.begins else ()
+    def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
+        """Return none: those at the end are enough."""
+        return ()
 
     def __call__(
         self, transition: Transition, loads: Mapping[Layout, Assessment]
     ) -> Mapping[str, float]:
-        """Return the term of the load, 0 before the end, and `deposit`, 0 in between."""
-        objective, load, deposit = transition.objective, 0.0, 0.0
-        if transition.begins != transition.ended:
-            deposit = DEPOSIT * objective.reward_value(loads[()].load)
+        """Return -1 at the beginning, and at the end the share of the load taken off."""
+        taken_off = 0.0
         if transition.ended:
-            load = -objective.reward_value(loads[transition.after].load)
-        return {objective.term: load, "deposit": deposit if transition.ended else -deposit}
+            taken_off = _taken_off(loads[transition.after], loads[()])
+        unprotected = -1.0 if transition.begins else 0.0
+        return {UNPROTECTED: unprotected, transition.objective.term: taken_off}
 
 
 @dataclass(frozen=True)
 class IncrementalReward:
-    """The reduction of the load by each module, paid at once; needs a set of blasts per module.
+    """What each module takes off the load, paid at once; needs a set of blasts per module.
 
-    A placement earns I(before) - I(after), where I is the load of the scenario's objective. The
-    first action also pays -I(initial), the load with the layout at `reset`: no barrier, unless an
-    option sets one. So the sum at any time is minus the load with the present layout, as if the
-    agent finished then, and over an episode that of `TerminalReward`.
+    The unit is the load without a barrier, as of `TerminalReward`. The first action also pays minus
+    the load with the layout at `reset`: no barrier, unless an option sets one. So the sum at any
+    time is minus the load with the present layout, as if the agent finished then.
     """
 
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
@@ -293,18 +292,25 @@ class IncrementalReward:
     def layouts(self, transition: Transition) -> Sequence[Layout]:
         """Return the layouts before and after the action, and at first the initial one."""
         changed = (transition.before, transition.after) if _has_changed(transition) else ()
-        return (*changed, transition.initial) if transition.begins else changed
+        first = (transition.initial,) if transition.begins else ()
+        return (*changed, *first, ()) if changed or first else ()
 
     def __call__(
         self, transition: Transition, loads: Mapping[Layout, Assessment]
     ) -> Mapping[str, float]:
-        """Return the load that the action took off."""
-        load, value = 0.0, transition.objective.reward_value
+        """Return the share of the load that the action took off."""
+        share = 0.0
         if _has_changed(transition):
-            load += value(loads[transition.before].load) - value(loads[transition.after].load)
+            share += _taken_off(loads[transition.after], loads[()])
+            share -= _taken_off(loads[transition.before], loads[()])
         if transition.begins:
-            load -= value(loads[transition.initial].load)
-        return {transition.objective.term: load}
+            share += _taken_off(loads[transition.initial], loads[()]) - 1.0
+        return {transition.objective.term: share}
+
+
+def _taken_off(load: Assessment, unprotected: Assessment) -> float:
+    """Return the share of the load without a barrier that is missing; 1 where nothing arrives."""
+    return float(np.nan_to_num(load.reduction_from(unprotected), nan=1.0))
 
 
 def _has_changed(transition: Transition) -> bool:

@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 from gymnasium import spaces
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutState
@@ -41,7 +41,9 @@ class BlastBarrierTwoObjectivesEnv(BlastBarrierEnv):
         low, high = np.array([-np.inf, -1.0]), np.array([1.0, 0.0])
         self.reward_space = spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
-    def step(self, action: np.int64 | int) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: np.int64 | int | IntArray
+    ) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Make a step, as `BlastBarrierEnv.step`, with the rewards of both objectives (2,)."""
         before = _spent_share(self.placement)
         observation, _, terminated, truncated, info = super().step(action)

@@ -68,7 +68,8 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self.single_observation_space = self.one.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._actions = self.one.action_space.n  # type: ignore[attr-defined]
+        space: Any = self.single_action_space
+        self._limits = np.array(getattr(space, "nvec", getattr(space, "n", 0)))
         self._most_steps = max_episode_steps or np.inf
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
@@ -146,7 +147,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         played, begun = _indices(~self._over), _indices(self._over)
         if not self._running or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
             raise gym.error.ResetNeeded(f"call reset: no episode in environments {begun}")
-        wanted = self._checked(actions, played)
+        wanted = self.episodes.code.numbers(self._checked(actions, played))
         rewards = np.zeros(self.num_envs)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         if played:
@@ -188,13 +189,13 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 
     def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> IntArray:
         given = np.asarray(actions)
-        if given.shape != (self.num_envs,) or not np.issubdtype(given.dtype, np.integer):
+        shape = self.num_envs, *self._limits.shape
+        if given.shape != shape or not np.issubdtype(given.dtype, np.integer):
             raise gym.error.InvalidAction(
-                f"actions have shape {given.shape} and type {given.dtype}, must be {self.num_envs}"
-                " integers"
+                f"actions have shape {given.shape} and type {given.dtype}, must be {shape} integers"
             )
-        least, most = given[played].min(initial=0), given[played].max(initial=0)
-        if not 0 <= least <= most < self._actions:
+        if (given[played] < 0).any() or (given[played] >= self._limits).any():
+            least, most = given[played].min(), given[played].max()
             raise gym.error.InvalidAction(
                 f"actions are from {least} to {most}, must be in {self.one.action_space}"
             )

@@ -534,10 +534,6 @@ class DesignProblem:
             self._assessed[key] = Assessment.of(self.case, layout, loads)
         return self._assessed[key]
 
-    def reward_value(self, layout: Sequence[Element]) -> float:
-        """Return the objective value in the unit of rewards: psi s, psi, or dimensionless."""
-        return self.scenario.objective.reward_value(self.assess(layout).load)
-
     def load(self, layout: Sequence[Element]) -> float:
         """Return the load of a layout over all threats, in the unit of the objective."""
         return self.assess(layout).load

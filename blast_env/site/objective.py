@@ -13,7 +13,6 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from
 from blast_env.sections import Section
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level, conditional_value_at_risk
-from blast_env.units import PA_PER_PSI
 
 Reference = Annotated[StrictFloat, Field(ge=1e-3, le=1e12)]
 Probability = Annotated[StrictFloat, Field(gt=0.0, lt=1.0)]
@@ -183,10 +182,6 @@ class ObjectiveSection(Section):
         if self.is_response or self.quantity == "both":
             return f"{load:.3g}"
         return f"{load:,.0f} {self.unit}"
-
-    def reward_value(self, load: float) -> float:
-        """Return a load in `unit` converted to the unit of rewards: psi s, psi, or none."""
-        return load if self.is_response or self.quantity == "both" else load / PA_PER_PSI
 
     def response(self, damage: FloatArray, area_m2: FloatArray) -> float:
         """Return the response of one structure from the damage of its bays.

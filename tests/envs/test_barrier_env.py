@@ -39,7 +39,7 @@ def test_placing_the_stock_or_finishing_sets_off_the_charge_with_what_stands() -
     assert not truncated
     assert env.placement.layout == ((1, 2),)
     assert np.argwhere(info["layout"]).tolist() == [[0, 1, 2]]
-    assert info["reward_terms"]["impulse"] == -info["impulse_psi_s"] < 0.0
+    assert info["reward_terms"]["impulse"] == info["reduction"] > 0.0
 
 
 def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
@@ -75,7 +75,7 @@ def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> Non
     assert same(observation, after)
     assert not ended
     assert reward == -0.25
-    assert info["reward_terms"] == {"impulse": 0.0, "deposit": 0.0, "invalid_actions": -0.25}
+    assert info["reward_terms"] == {"unprotected": 0.0, "impulse": 0.0, "invalid_actions": -0.25}
     assert info["invalid_actions"] == 1
     env.step(0)
     again = env.step(0)  # the cell is taken now
@@ -126,16 +126,14 @@ def test_incremental_rewards_add_up_to_the_terminal_one(threat: str, layout: tup
     assert sum(rewards["terminal"]) < 0.0
 
 
-def test_terminal_rewards_add_up_to_the_impulse_and_the_deposit_comes_back() -> None:
+def test_terminal_rewards_add_up_to_minus_the_share_of_the_impulse_that_arrives() -> None:
     steps = play(make(), seed=5)[1:]
-    terms = [step[4]["reward_terms"] for step in steps]
-    impulse_psi_s = steps[-1][4]["impulse_psi_s"]
-    assert [term["impulse"] for term in terms] == [0.0] * (len(terms) - 1) + [-impulse_psi_s]
-    assert sum(step[1] for step in steps) == pytest.approx(-impulse_psi_s, rel=1e-12)
-    deposits = [term["deposit"] for term in terms]
-    unprotected_psi_s = steps[-1][4]["unprotected_impulse_pa_s"] / PA_PER_PSI
-    assert deposits[0] == -deposits[-1] == pytest.approx(-2.0 * unprotected_psi_s)
-    assert not any(deposits[1:-1])
+    terms, info = [step[4]["reward_terms"] for step in steps], steps[-1][4]
+    before = [0.0] * (len(terms) - 1)
+    assert [term["unprotected"] for term in terms] == [-1.0, *before]
+    assert [term["impulse"] for term in terms] == [*before, info["reduction"]]
+    arrives = info["impulse_pa_s"] / info["unprotected_impulse_pa_s"]
+    assert sum(step[1] for step in steps) == pytest.approx(-arrives, rel=1e-12)
 
 
 @pytest.mark.parametrize("threat", ["visible", "hidden"])
@@ -154,20 +152,21 @@ def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
     env.step(HYDRANT)  # illegal: the first step pays for what stands from the start
     earned = env.step(3 * COLUMNS)[1]
     _, last, _, _, info = env.step(FINISH)
+    unprotected = info["unprotected_impulse_pa_s"]
     evaluator, (charge,), ((seed,),) = (
         BlastEvaluator(small_scenario(), ThinEngine()),
         info["charges"],
         info["blast_seeds"],
     )
     before = evaluator.loads([(0, 4)], LoadCase(charge, seed)).protected_impulse_pa_s
-    assert PA_PER_PSI * earned == pytest.approx(before - info["impulse_pa_s"], abs=1e-8)
+    assert earned == pytest.approx((before - info["impulse_pa_s"]) / unprotected, abs=1e-9)
     assert last == 0.0
 
 
 @pytest.mark.parametrize("reward", ["terminal", "incremental"])
 @pytest.mark.parametrize("threat", ["visible", "hidden"])
 @pytest.mark.parametrize("limit", [1, 3])
-def test_to_be_cut_off_never_pays_better_than_to_finish(
+def test_to_be_cut_off_pays_what_to_finish_pays_or_as_much_as_no_barrier(
     reward: str, threat: str, limit: int
 ) -> None:
     """A time limit that a user puts round the environment, which does not learn of it."""
@@ -185,7 +184,7 @@ def test_to_be_cut_off_never_pays_better_than_to_finish(
         if reward == "incremental":
             assert cut_off == pytest.approx(finished, rel=1e-12)
         else:
-            assert cut_off < finished
+            assert cut_off == -1.0
 
 
 class PayPerModule:
@@ -442,7 +441,7 @@ def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
     expected = evaluate_layout(HUT, WALL, [0], engine="gas", cell_m=0.5)
     assert info["impulse_pa_s"] == pytest.approx(expected.impulse_pa_s.value)
     assert info["reduction"] == pytest.approx(expected.mean_reduction)
-    assert reward == pytest.approx(-info["impulse_psi_s"])
+    assert reward == pytest.approx(info["reduction"] - 1.0)
     assert info["calibration"] == "none"
     assert "impulse_sim" not in info
     assert info["blasts"] == 2

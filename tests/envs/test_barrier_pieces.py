@@ -36,8 +36,8 @@ def test_actions_place_pieces_and_the_charge_goes_off() -> None:
         rewards.append(reward)
     _, reward, ended, _, info = env.step(catalogue.finish)
     assert (ended, env.placement.layout) == (True, WALL)
-    assert rewards[0] < 0.0 == sum(rewards[1:])  # the deposit
-    assert sum(rewards) + reward == pytest.approx(-info["impulse_psi_s"], rel=1e-9)
+    assert rewards == [-1.0] + [0.0] * (len(WALL) - 1)
+    assert reward == pytest.approx(info["reduction"], rel=1e-9)
     assert 0.1 < info["reduction"] < 1.0
 
 

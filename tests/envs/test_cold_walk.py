@@ -8,7 +8,7 @@ from typing import Final
 import pytest
 
 MOST_FILES: Final = {"make": 83, "reset": 21, "step": 45}
-MOST_FUNCTIONS: Final = {"make": 558, "reset": 116, "step": 299}
+MOST_FUNCTIONS: Final = {"make": 565, "reset": 116, "step": 299}
 
 _WALK: Final = """
 import json, os, sys

@@ -178,7 +178,7 @@ def test_vectors_of_environments_stack_the_information() -> None:
     assert ended.tolist() == [False, True]
     assert info["reduction"][0] == 0.0
     assert info["layout"].sum(axis=(1, 2, 3)).tolist() == [2, 0]
-    assert info["reward_terms"]["impulse"][1] == -info["impulse_psi_s"][1]
+    assert info["reward_terms"]["impulse"][1] == info["reduction"][1]
     assert sum(terms[1] for name, terms in info["reward_terms"].items() if name[0] != "_") == (
         pytest.approx(rewards[1])
     )

@@ -105,7 +105,7 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
         _, reward, terminated, _, info = env.step(action)
         paid += float(reward)
     assert terminated
-    assert paid == pytest.approx(-info["response"])
+    assert paid == pytest.approx(-info["response"] / info["unprotected_response"])
     assert info["reward_terms"].keys() == {"response", "invalid_actions"}
     assert info["level_of_protection"] in {level.label for level in LevelOfProtection}
     assert env.placement.layout == (TAKEN,)

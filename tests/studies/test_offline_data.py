@@ -45,7 +45,7 @@ def test_the_command_writes_what_minari_reads(
     data = minari.load_dataset("blast/barrier-v0")
     assert data.total_episodes == 4
     for episode in data.iterate_episodes():
-        assert sum(episode.rewards) == pytest.approx(-float(episode.infos["impulse_psi_s"][-1]))
+        assert sum(episode.rewards) == pytest.approx(float(episode.infos["reduction"][-1]) - 1.0)
         assert bool(episode.terminations[-1])
 
 

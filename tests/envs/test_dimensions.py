@@ -1,0 +1,97 @@
+"""Actions as vectors of variant, row and column: the same placements, masks, both batches."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from sb3_contrib import MaskablePPO
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from tests.envs.small import make, same
+from tests.evaluation.engines.shade import ShadeEngine
+
+
+def both(scenario: str) -> tuple[BlastBarrierEnv, BlastBarrierEnv]:
+    kinds = ("place", "dimensions")
+    flat, by_parts = (
+        BlastBarrierEnv(scenario, action=kind, observation="features", engine=ShadeEngine())
+        for kind in kinds
+    )
+    return flat, by_parts
+
+
+@pytest.mark.parametrize("scenario", ["courtyard", "hotel_forecourt"])
+def test_the_same_placements_make_the_same_episode(scenario: str) -> None:
+    flat, by_parts = both(scenario)
+    catalogue, rng = flat.task.source.representative.zone.catalogue, np.random.default_rng(0)
+    shape = (len(catalogue.variants), *catalogue.shape)
+    assert by_parts.action_space == gym.spaces.MultiDiscrete([shape[0] + 1, *shape[1:]])
+    flat.reset(seed=3)
+    by_parts.reset(seed=3)
+    ended = False
+    while not ended:
+        number = int(rng.choice(np.flatnonzero(flat.action_masks())))
+        parts = np.unravel_index(number, shape) if number < catalogue.finish else (shape[0], 0, 0)
+        one, reward, ended, _, _ = flat.step(number)
+        other, same_reward, same_end, _, info = by_parts.step(np.array(parts))
+        assert same(one, other)
+        assert (reward, ended) == (same_reward, same_end)
+    assert same(flat.placement.layout, by_parts.placement.layout)
+    assert info["placed"] > 0
+
+
+@pytest.mark.parametrize("scenario", ["courtyard", "hotel_forecourt"])
+def test_the_mask_has_each_value_of_some_legal_placement(scenario: str) -> None:
+    flat, by_parts = both(scenario)
+    catalogue = flat.task.source.representative.zone.catalogue
+    flat.reset(seed=3)
+    by_parts.reset(seed=3)
+    legal = flat.action_masks()[:-1].reshape(-1, *catalogue.shape)
+    variants, rows, columns = (sorted({*axis}) for axis in legal.nonzero())
+    mask, count = by_parts.action_masks(), len(catalogue.variants)
+    assert np.flatnonzero(mask[: count + 1]).tolist() == [*variants, count]
+    assert np.flatnonzero(mask[count + 1 :][: catalogue.shape[0]]).tolist() == rows
+    assert np.flatnonzero(mask[count + 1 + catalogue.shape[0] :]).tolist() == columns
+    by_parts.step(np.array([count, 0, 0]))
+    after = by_parts.action_masks()
+    assert not after[:count].any()
+    assert after[count:].all()
+
+
+def test_parts_that_are_illegal_together_take_the_nearest_place() -> None:
+    env = make(action="dimensions")
+    env.reset(seed=1)
+    hydrant = np.array([0, 4, 0])  # no module may stand on it
+    env.step(hydrant)
+    assert env.placement.layout in (((3, 0),), ((5, 0),), ((4, 1),), ((4, 2),))
+
+
+def test_a_batch_plays_what_single_environments_play() -> None:
+    options: dict[str, Any] = {
+        "scenario": "control_room",
+        "engine": ShadeEngine(),
+        "observation": "features",
+        "action": "dimensions",
+    }
+    batch = gym.make_vec("BlastBarrier-v0", 3, vectorization_mode="vector_entry_point", **options)
+    singles = gym.make_vec("BlastBarrier-v0", 3, vectorization_mode="sync", **options)
+    assert batch.action_space == singles.action_space
+    assert same(batch.reset(seed=5)[0], singles.reset(seed=5)[0])
+    batch.action_space.seed(1)
+    for _ in range(12):
+        actions = batch.action_space.sample()
+        one, other = batch.step(actions), singles.step(actions)
+        assert all(same(mine, its) for mine, its in zip(one[:4], other[:4], strict=True))
+        assert same(one[4]["action_mask"], other[4]["action_mask"])
+    with pytest.raises(gym.error.InvalidAction, match=r"must be \(3, 3\) integers"):
+        batch.step(np.zeros(3, dtype=np.int64))
+
+
+def test_maskable_ppo_takes_the_masks() -> None:
+    env = make(action="dimensions", observation="features")
+    agent = MaskablePPO("MlpPolicy", env, n_steps=32, batch_size=16, n_epochs=1, seed=0)
+    agent.learn(64)
+    observation, _ = env.reset(seed=2)
+    action, _ = agent.predict(observation, action_masks=env.action_masks())
+    assert env.action_space.contains(action)
