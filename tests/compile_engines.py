@@ -19,12 +19,9 @@ from blast_env.gas import (
     GasSolver,
     Gauges,
     GroundMap,
-    RefinedSolver,
     Settling,
-    exposed_faces,
     ground_faces,
     set_charge,
-    set_refined_charge,
 )
 from blast_env.layout import draw_charge
 from blast_env.site import Scenario
@@ -54,28 +51,6 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
     )
     set_charge(solver, charge)
     for _ in range(4):  # hot gas is cooled at every fourth
-        solver.step()
-
-
-def adaptive_cells(precision: Literal["single", "double"]) -> None:
-    """Two sizes of cells, with a wall too thin for the larger ones."""
-    solid = np.zeros((32, 24, 16), dtype=bool)
-    solid[21, 4:20, 0:6] = True
-    grid = GasGrid(0.25, solid)
-    faces = exposed_faces(grid, solid)
-    charge = GasCharge(1.0, (2.0, 3.0, 0.0))
-    solver = RefinedSolver(
-        grid,
-        2,
-        faces=faces,
-        recorders=(FaceLoads(len(faces)),),
-        precision=precision,
-        with_fuel=True,
-        burning=charge.burning,
-        settling=Settling(0.0, 2.0),
-    )
-    set_refined_charge(solver, charge, 1.0)
-    for _ in range(4):
         solver.step()
 
 
@@ -111,8 +86,6 @@ def main() -> None:
     event_engine()
     gas_engine("single")
     gas_engine("double")
-    adaptive_cells("single")
-    adaptive_cells("double")
     surrogate()
     driving()
     response()

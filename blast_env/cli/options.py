@@ -36,7 +36,7 @@ ENGINE_HELP: Final = (
 BY_SITE: Final = f"{PAPER_ENGINES['train']}, or {JUDGE} where the site states heights"
 CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
-    "for search; fine: later, for final results. adaptive: small at fronts, large elsewhere."
+    "for search; fine: later, for final results."
 )
 FINAL_CELLS: Final = "uniform of 0.25 m, fine on sites wider than 40 m"
 UNTIL_HELP: Final = (

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from blast_env.gas.block_map import shape_of_blocks
     from blast_env.gas.coarsening import CoarseningSolver, shape_to_double, with_double_cells
     from blast_env.gas.cost import CostGuess, cost_words, time_words
     from blast_env.gas.engine import GasRun
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
         Snapshots,
         positive_phases,
     )
-    from blast_env.gas.refinement import RefinedSolver
     from blast_env.gas.settings import CELLS, CHECKED_CELLS, Cells, GasSettings
     from blast_env.gas.solver import AIR_DENSITY_KG_M3, Burning, Gas, GasSolver, Settling
     from blast_env.gas.source import (
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
         lay,
         least_clearance_m,
         set_charge,
-        set_refined_charge,
     )
     from blast_env.gas.spherical import SphericalBlast
 else:
@@ -65,7 +62,6 @@ __all__ = [
     "LoadTable",
     "PatchHistories",
     "RadialProfile",
-    "RefinedSolver",
     "Settling",
     "Snapshots",
     "SphericalBlast",
@@ -78,8 +74,6 @@ __all__ = [
     "least_clearance_m",
     "positive_phases",
     "set_charge",
-    "set_refined_charge",
-    "shape_of_blocks",
     "shape_to_double",
     "stepped_buildings",
     "time_words",

@@ -7,18 +7,13 @@ core updates per second. docs/howto/app.md compares estimates with measured cost
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cbrt, ceil, expm1, pi, prod
+from math import cbrt, ceil, expm1, prod
 from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.gas.ending import SOUND_M_S, corners_m, sound_s, watched_structures
 from blast_env.gas.settings import GasSettings
-from blast_env.geometry import Rectangle
 from blast_env.site.blast_site import BlastSite
-
-DETOUR: Final = 1.2
-"""Longest way of a front that adaptive cells follow to a structure, over the way to its farthest
-corner."""
 
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0
@@ -38,14 +33,7 @@ _PARTS: Final = 100
 """Number of intervals of a run in which updated cells are counted."""
 
 _CELLS_PER_S: Final = 35e6
-_ADAPTIVE_CELLS_PER_S: Final = 11e6
-_FRONT_CELLS: Final = 1.5e9
-_FRONT_POWER: Final = 0.7
-"""Updates of cells along fronts of ten cells' thickness at which as many are made, and the power
-with which they grow; both are fitted to blasts on the bundled sites."""
 _BYTES_PER_CELL: Final = 28.0
-_ADAPTIVE_BYTES: Final = 300e6
-_ADAPTIVE_BYTES_PER_CELL: Final = 12.0
 _PROCESS_BYTES: Final = 270e6
 _DRAWING_S: Final = 2.5
 
@@ -59,19 +47,17 @@ class CostGuess:
         steps: Number of steps until the loads are known.
         memory_bytes: Memory of the process.
         moved: Number of cell updates, summed over all steps.
-        cells_per_s: Number of cell updates per second of a busy or old core.
     """
 
     cells: int
     steps: int
     memory_bytes: float
     moved: float
-    cells_per_s: float = _CELLS_PER_S
 
     @property
     def seconds(self) -> float:
         """Time on a busy or old core, without films; a fast core takes half to 80 % of it."""
-        return self.moved / self.cells_per_s
+        return self.moved / _CELLS_PER_S
 
     def check(self, settings: GasSettings) -> None:
         """Refuse a blast that costs too much.
@@ -104,13 +90,13 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
     scale = cbrt(site.charge.tnt_kg / 100.0)
     watched = watched_structures(site, settings.until)
     end_s = sound_s(site, corners_m(site, watched)) + max(_AFTER_S * scale, response_s)
-    part_s, sides_m = (settings.until_s or end_s) / _PARTS, _sides_m(site)
-    if settings.is_adaptive:
-        return _cost_of_adaptive(settings, site, part_s, scale)
+    part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
+    left_m, bottom_m, right_m, top_m = site.site_m
+    sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
     steps, moved = 0.0, 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
-        front_m = _front_m(now_s, scale)
+        front_m = SOUND_M_S * now_s - ahead_m * expm1(-now_s / (_AHEAD_AFTER_S * scale))
         cell_m = settings.smallest_m * 2.0 ** sum(front_m > run_m for run_m in settings.doubled_m)
         step_s = cell_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
         x, y, z = _cells_in(sides_m, cell_m, settings, margin=False)
@@ -119,76 +105,6 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
         moved += part_s / step_s * min(x, 2.0 * run) * min(y, 2.0 * run) * min(z, run)
     cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
     return CostGuess(cells, ceil(steps), _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
-
-
-def _sides_m(site: BlastSite) -> tuple[float, float, float]:
-    """Return width, depth and height of the air of a site."""
-    left_m, bottom_m, right_m, top_m = site.site_m
-    return right_m - left_m, top_m - bottom_m, site.air_height_m
-
-
-def _front_m(now_s: float, scale: float) -> float:
-    """Return the path of the front in the open."""
-    return SOUND_M_S * now_s - _AHEAD_M * scale * expm1(-now_s / (_AHEAD_AFTER_S * scale))
-
-
-def _cost_of_adaptive(
-    settings: GasSettings, site: BlastSite, part_s: float, scale: float
-) -> CostGuess:
-    """Return the estimated cost of a blast on adaptive cells.
-
-    1. Cells of the largest size are those behind the front, in whole blocks.
-    2. Those of the second size are before walls that the front has passed.
-    3. Smaller ones are along fronts where these are followed. Fronts meet, and the longer they are
-       the smaller is the part that is followed: the number of cells grows with a power of their
-       area.
-
-    Args:
-        settings: The settings of the run.
-        site: The structures and the charge.
-        part_s: Length of a part of the run.
-        scale: Cube root of the mass over 100 kg.
-    """
-    sides_m = width_m, depth_m, height_m = _sides_m(site)
-    count = settings.levels
-    largest_m = settings.smallest_m * 2.0 ** (count - 1)
-    second_m, block_m = 0.5 * largest_m, 8.0 * largest_m
-    most_m = (
-        width_m + 2.0 * (settings.margin_m + block_m),
-        depth_m + 2.0 * (settings.margin_m + block_m),
-        height_m + block_m,
-    )
-    walls_m2 = sum(
-        _walls_m2(structure.rectangle_m, structure.height_m) for structure in site.structures
-    )
-    watched = watched_structures(site, settings.until)
-    reach_m = DETOUR * SOUND_M_S * sound_s(site, corners_m(site, watched))
-    steps = large = at_walls = along = 0.0
-    for part in range(_PARTS):
-        now_s = (part + 0.5) * part_s
-        front_m = _front_m(now_s, scale)
-        step_s = settings.smallest_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
-        own_steps = part_s / step_s
-        steps += own_steps
-        x_m, y_m = (min(extent_m, 2.0 * (front_m + block_m)) for extent_m in most_m[:2])
-        z_m = min(most_m[2], front_m + block_m)
-        large += own_steps / 2.0 ** (count - 1) * x_m * y_m * z_m / largest_m**3
-        passed = min(2.0 * front_m / max(width_m, depth_m), 1.0)
-        at_walls += own_steps / 2.0 ** (count - 2) * passed * walls_m2 * 8.0 / second_m**2
-        length_m = min(2.0 * pi * front_m, width_m + depth_m, 2.0 * reach_m)
-        area_m2 = length_m * min(front_m, height_m)
-        along += own_steps * 10.0 * area_m2 / settings.smallest_m**2
-    fronts = _FRONT_CELLS * (along / _FRONT_CELLS) ** _FRONT_POWER
-    cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
-    memory = _ADAPTIVE_BYTES + _ADAPTIVE_BYTES_PER_CELL * cells
-    return CostGuess(cells, ceil(steps), memory, large + at_walls + fronts, _ADAPTIVE_CELLS_PER_S)
-
-
-def _walls_m2(rectangle_m: Rectangle, height_m: float | None) -> float:
-    """Return the area of the walls and the roof of a structure."""
-    left_m, bottom_m, right_m, top_m = rectangle_m
-    width_m, depth_m = right_m - left_m, top_m - bottom_m
-    return 2.0 * (width_m + depth_m) * (height_m or 0.0) + width_m * depth_m
 
 
 def _cells_in(

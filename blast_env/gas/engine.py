@@ -9,9 +9,8 @@ until the loads on the structures are known.
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import partial
 from math import cbrt, ceil
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,8 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.compilation import compilation_notice
 from blast_env.errors import BlastEnvError
-from blast_env.gas.block_map import layers_around, shape_of_blocks
 from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
-from blast_env.gas.cost import DETOUR, cost_of_run
+from blast_env.gas.cost import cost_of_run
 from blast_env.gas.enclosure import room_around
 from blast_env.gas.ending import (
     AREA,
@@ -34,7 +32,6 @@ from blast_env.gas.ending import (
 from blast_env.gas.faces import Faces, exposed_faces
 from blast_env.gas.grid import GasGrid, layers_to
 from blast_env.gas.probes import FaceLoads, Gauges
-from blast_env.gas.refinement import RefinedSolver
 from blast_env.gas.settings import FACE_NAMES, GasSettings, cells_unchecked
 from blast_env.gas.solver import Gas, GasSolver, Recorder, Settling
 from blast_env.gas.source import (
@@ -43,10 +40,8 @@ from blast_env.gas.source import (
     largest_radius_m,
     least_clearance_m,
     set_charge,
-    set_refined_charge,
 )
 from blast_env.gas.spherical_stage import spherical_stage
-from blast_env.geometry import Rectangle
 from blast_env.results import EndReason
 from blast_env.site.blast_site import OUTWARDS, WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
@@ -55,8 +50,6 @@ if TYPE_CHECKING:
     from blast_env.site.footprint import Footprint
 
 _HOTTEST: Final = 4.0  # temperature limit of settled products, in units of still air's
-_NEAR_M: Final = 4.0  # longer than `DETOUR` allows, for blocks in part within it
-
 _LOOK_EVERY: Final = 4  # steps between two checks of the loads
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
@@ -142,8 +135,19 @@ class GasRun:
         self.gauges = _gauges(self.grid, site)
         scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
         own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
-        settling = Settling(settings.settled_s * scale, _HOTTEST)
-        self.solver = self._solver((*own, *recorders(self.grid)), settling)
+        solver = GasSolver(
+            self.grid,
+            faces=self.table.faces,
+            recorders=(*own, *recorders(self.grid)),
+            with_fuel=True,
+            burning=self.charge.burning,
+            settling=Settling(settings.settled_s * scale, _HOTTEST),
+            threads=settings.threads,
+        )
+        with _notice():
+            set_charge(solver, self.charge, self.remap_radius_m)
+            doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
+        self.solver: Gas = CoarseningSolver(solver, doubled_s) if doubled_s else solver
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
         self.end_reason: EndReason | None = None
@@ -164,31 +168,6 @@ class GasRun:
     def steps(self) -> int:
         """Number of steps."""
         return self.solver.steps
-
-    def _solver(self, recorders: Sequence[Recorder], settling: Settling) -> Gas:
-        """Return the solver with the expanded charge."""
-        settings, charge = self.settings, self.charge
-        make: Callable[..., Any] = GasSolver
-        expand: Callable[[Any, GasCharge, float], None] = set_charge
-        if settings.is_adaptive:
-            followed = partial(_reaches_early, _watched_boxes(self.site, settings.until), charge)
-            make = partial(RefinedSolver, levels=settings.levels, followed=followed)
-            expand = set_refined_charge
-        solver: Gas = make(
-            self.grid,
-            faces=self.table.faces,
-            recorders=recorders,
-            with_fuel=True,
-            burning=charge.burning,
-            settling=settling,
-            threads=settings.threads,
-        )
-        with _notice():
-            expand(solver, charge, self.remap_radius_m)
-            doubled_s = [charge.profile(run_m).time_s for run_m in settings.doubled_m]
-        if doubled_s and isinstance(solver, GasSolver):  # adaptive cells are never doubled
-            return CoarseningSolver(solver, doubled_s)
-        return solver
 
     def record(self, recorder: Recorder) -> None:
         """Add a recorder before the first step.
@@ -217,13 +196,6 @@ class GasRun:
     def has_come(self, index: int) -> bool:
         """Return whether sound has reached all corners of a structure in plan, by its index."""
         return self.solver.time_s >= sound_s(self.site, corners_m(self.site, [index]))
-
-    def follows(self, index: int) -> bool:
-        """Return whether the fronts on the way to a structure have the smallest cells."""
-        followed = self.site.structures[index].is_barrier or index in watched_structures(
-            self.site, self.settings.until
-        )
-        return followed or not self.settings.is_adaptive
 
     def is_known(self, index: int) -> bool:
         """Return whether the loads on the counted walls of a structure are known, by its index.
@@ -281,38 +253,6 @@ class GasRun:
         return tuple(notes)
 
 
-def _watched_boxes(site: BlastSite, until: str | float) -> list[Rectangle]:
-    """Return the rectangles of the structures that a run waits for, of the barrier and gauges."""
-    watched = set(watched_structures(site, until))
-    boxes = [
-        structure.rectangle_m
-        for k, structure in enumerate(site.structures)
-        if k in watched or structure.is_barrier
-    ]
-    places = (gauge.position_m for gauge in site.gauges)
-    return boxes + [Rectangle(x, y, x, y) for x, y, _ in places]
-
-
-def _reaches_early(
-    boxes: Sequence[Rectangle], charge: GasCharge, x_m: FloatArray, y_m: FloatArray
-) -> NDArray[np.bool_]:
-    """Return whether the way from the charge over a place to a box is not much of a detour.
-
-    Waves that come later than those along the way to its farthest corner are echoes.
-    """
-    from_x, from_y, _ = charge.position_m
-    there_m = np.hypot(x_m - from_x, y_m - from_y)
-    early = np.zeros(there_m.shape, dtype=bool)
-    for left, bottom, right, top in boxes:
-        beside_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
-        before_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-        corners = [(x, y) for x in (left, right) for y in (bottom, top)]
-        farthest_m = max(np.hypot(x - from_x, y - from_y) for x, y in corners)
-        way_m = there_m + np.hypot(beside_m, before_m)
-        early |= way_m <= DETOUR * farthest_m + _NEAR_M
-    return early
-
-
 def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
     """Return the grid with its solid cells."""
     cell_m = settings.smallest_m
@@ -323,9 +263,6 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
     shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
     buffer_layers = layers_to(settings.border_m / cell_m)
     shape = shape_to_double(shape, buffer_layers, len(settings.doubled_m))
-    if settings.is_adaptive:
-        shape = shape_of_blocks(shape, settings.levels)
-        buffer_layers = layers_around(settings.border_m / (cell_m * 2 ** (settings.levels - 1)))
     origin = low - margin * cell_m
     grid = GasGrid(
         cell_m,

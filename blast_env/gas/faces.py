@@ -89,13 +89,13 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
     sides: list[NDArray[np.int64]] = []
     for axis in range(3):
         for side in (-1, 1):
-            here: list[slice] = [slice(None)] * 3
-            there = here.copy()
-            here[axis] = slice(None, -1) if side > 0 else slice(1, None)
-            there[axis] = slice(1, None) if side > 0 else slice(None, -1)
-            exposed = cells[tuple(here)] & ~grid.solid[tuple(there)]
-            neighbour = np.argwhere(exposed)
-            neighbour[:, axis] += side > 0
+            step = np.zeros(3, dtype=np.int64)
+            step[axis] = side
+            chosen = np.argwhere(cells)
+            neighbour = chosen + step
+            inside = (neighbour[:, axis] >= 0) & (neighbour[:, axis] < grid.shape[axis])
+            neighbour = neighbour[inside]
+            neighbour = neighbour[~grid.solid[tuple(neighbour.T)]]
             air.append(neighbour)
             axes.append(np.full(len(neighbour), axis))
             sides.append(np.full(len(neighbour), side))

@@ -58,17 +58,11 @@ class _Growth:
 _GROWING: Final[Mapping[str, _Growth]] = MappingProxyType(
     {"coarse": _Growth(0.5, 90.0, 1.0), "fine": _Growth(0.25, 130.0, 0.5)}
 )
-ADAPTIVE: Final = "adaptive"
-CELLS: Final = (UNIFORM, *_GROWING, ADAPTIVE)
+CELLS: Final = (UNIFORM, *_GROWING)
 """Values of `GasSettings.cells`."""
 
-ADAPTIVE_CELL_M: Final = 0.25
-"""Side of the smallest adaptive cells, unless smaller ones are asked for."""
-
-_LARGEST_M: Final = 1.0
-
 Cells: TypeAlias = float | str
-"""Side of cells in m, or "coarse", "fine" or "adaptive" for cells of several sizes."""
+"""Side of cells in m, or "coarse" or "fine" for cells that grow."""
 
 _WAITED_FOR: Final = ("structures", "walls", "gauges")
 _FARTHEST_M: Final = 10_000.0
@@ -84,8 +78,7 @@ class GasSettings:
         cells: "uniform", or the growth of cells with the blast: they are doubled each time the
             front has run a certain number of them. "coarse", for search on large sites, grows from
             0.5 to 1 m, "fine", for final results there, from 0.25 to 0.5 m; both begin at `cell_m`
-            if that is smaller. "adaptive" has cells of 0.25 m, or of `cell_m` if that is smaller,
-            at fronts, and of up to 1 m elsewhere.
+            if that is smaller.
         margin_m: Width of the strip of cells of constant size outside the site.
         border_m: Least distance of the open borders from that strip, and from the top of the air;
             the cells between grow outwards.
@@ -131,7 +124,7 @@ class GasSettings:
 
     @classmethod
     def with_cells(cls, cells: Cells) -> Self:
-        """Return settings with cells of one side in m, or with cells of a name.
+        """Return settings with cells of one side in m, or with "coarse" or "fine" cells.
 
         Raises:
             BlastEnvError: If the name is unknown or the side is out of bounds.
@@ -141,25 +134,11 @@ class GasSettings:
     @property
     def is_growing(self) -> bool:
         """Whether cells grow with the blast."""
-        return self.cells in _GROWING
-
-    @property
-    def is_adaptive(self) -> bool:
-        """Whether cells are small where the wave is, and large elsewhere."""
-        return self.cells == ADAPTIVE
-
-    @property
-    def levels(self) -> int:
-        """Number of sizes of adaptive cells, each twice the last; 1 for other cells."""
-        if not self.is_adaptive:
-            return 1
-        return floor(log2(_LARGEST_M / self.smallest_m) + 1e-9) + 1
+        return self.cells != UNIFORM
 
     @property
     def smallest_m(self) -> float:
         """Side of the smallest cells."""
-        if self.is_adaptive:
-            return min(self.cell_m, ADAPTIVE_CELL_M)
         if not self.is_growing:
             return self.cell_m
         return min(self.cell_m, _GROWING[self.cells].smallest_m)
@@ -176,7 +155,7 @@ class GasSettings:
     @property
     def cell_words(self) -> str:
         """Description of the cells for display."""
-        kind = "cells of" if self.cells == UNIFORM else f"{self.cells} cells from"
+        kind = f"{self.cells} cells from" if self.is_growing else "cells of"
         return f"{kind} {self.smallest_m:g} m"
 
     @property

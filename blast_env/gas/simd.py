@@ -22,8 +22,6 @@ _VECTOR_BYTES: Final = 64 if get_host_cpu_features().get("avx512f", False) else 
 LANES: Final = _VECTOR_BYTES // 4
 """Cells per vector in single precision, and a multiple of those in double precision."""
 
-_EIGHT: Final = 8
-
 _CONTRACT: Final = ("contract",)
 _BITS: Final[dict[types.Type, int]] = {types.float32: 32, types.float64: 64}
 
@@ -210,70 +208,6 @@ def store(_context: Any, place: Any, index: Any, value: Any) -> tuple[Any, Calla
 
 def _entries(builder: Any, args: Any, kind: Any) -> Any:
     return builder.bitcast(builder.gep(args[0], [args[1]], inbounds=True), kind.as_pointer())
-
-
-@_lane
-def copy_eight(
-    _context: Any, target: Any, to: Any, source: Any, at: Any
-) -> tuple[Any, Callable[..., Any]]:
-    """Copy eight entries from one place in memory to another of the same type."""
-    if target != source:
-        raise TypeError(f"copy_eight({target}, {to}, {source}, {at})")
-
-    def build(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        kind, align = _eight(context, source)
-        entries = builder.load(_entries(builder, args[2:], kind), align=align)
-        builder.store(entries, _entries(builder, args[:2], kind), align=align)
-        return context.get_dummy_value()
-
-    return types.void(target, to, source, at), build
-
-
-@_lane
-def transpose_eights(
-    _context: Any, target: Any, to: Any, across: Any, source: Any, at: Any, stride: Any
-) -> tuple[Any, Callable[..., Any]]:
-    """Copy eight rows of eight entries as columns.
-
-    Rows of the source lie `stride` apart, those of the target, the columns, `across` apart.
-    """
-    if target != source:
-        raise TypeError(f"transpose_eights({target}, {to}, {across}, {source}, {at}, {stride})")
-
-    def build(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        kind, align = _eight(context, source)
-        place, first, apart = args[3:]
-        rows = []
-        for k in range(_EIGHT):
-            index = builder.add(first, builder.mul(apart, ir.Constant(apart.type, k)))
-            rows.append(builder.load(_entries(builder, (place, index), kind), align=align))
-        # Each stage exchanges the off-diagonal halves of squares of 2, 4 and 8 entries.
-        for half in (1, 2, 4):
-            numbers = range(_EIGHT)
-            one = [n if not n & half else n - half + _EIGHT for n in numbers]
-            other = [n + half if not n & half else n + _EIGHT for n in numbers]
-            for k in (n for n in numbers if not n & half):
-                pair = rows[k], rows[k + half]
-                rows[k], rows[k + half] = (_chosen_lanes(builder, pair, n) for n in (one, other))
-        place, first, apart = args[:3]
-        for k, row in enumerate(rows):
-            index = builder.add(first, builder.mul(apart, ir.Constant(apart.type, k)))
-            builder.store(row, _entries(builder, (place, index), kind), align=align)
-        return context.get_dummy_value()
-
-    whole = types.int64
-    return types.void(target, whole, whole, source, whole, whole), build
-
-
-def _chosen_lanes(builder: Any, pair: tuple[Any, Any], lanes: list[int]) -> Any:
-    order = ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), lanes)
-    return builder.shuffle_vector(*pair, order)
-
-
-def _eight(context: Any, place: Any) -> tuple[Any, int]:
-    """Return the type of a vector of eight entries at a place, and the alignment of one."""
-    scalar = context.get_value_type(place.dtype)
-    return ir.VectorType(scalar, _EIGHT), place.dtype.bitwidth // 8
 
 
 @_lane

@@ -12,23 +12,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import cbrt, ceil, exp, inf, isfinite, log, log2, pi, sqrt
 from threading import Lock
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from blast_env.errors import BlastEnvError
-from blast_env.gas.block_kernels import SIDE as BLOCK_SIDE
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, Burning, GasSolver
 from blast_env.gas.spherical import PRODUCTS, Floats, SphericalBlast
 from blast_env.gas.state import GAMMA
 from blast_env.site.blast_site import TNT_KG_M3
-
-if TYPE_CHECKING:
-    from blast_env.gas.block_map import BlockLevel
-    from blast_env.gas.refinement import RefinedSolver
 
 LEAST_RADIUS_CELLS: Final = 2
 """Least radius of the front, in cells, at which it is mapped onto a grid."""
@@ -226,43 +221,6 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
         fuel_kg_m3=fuel,
         start=start,
     )
-    solver.time_s = profile.time_s
-
-
-def set_refined_charge(solver: "RefinedSolver", charge: GasCharge, radius_m: float) -> None:
-    """Set the state and the time of a solver with several sizes of cells; see `set_charge`.
-
-    Cells within the front are as small as they can be.
-
-    Args:
-        solver: Created with `with_fuel=True` and `burning=charge.burning`.
-        charge: The charge.
-        radius_m: Radius of the front.
-
-    Raises:
-        BlastEnvError: If the radius is within the charge.
-    """
-    profile = charge.profile(radius_m)
-    grid, centre = solver.grid, np.array(_centre(charge))
-    velocity = solver.velocity_m_s
-    units = np.array([1.0, velocity, velocity, velocity, velocity**2, 1.0]) * AIR_DENSITY_KG_M3
-
-    def fill(level: "BlockLevel", first: tuple[int, int, int]) -> Floats | None:
-        low = np.array(grid.origin_m) + level.cell_m * np.array(first)
-        side_m = level.cell_m * BLOCK_SIDE
-        outside = np.maximum(np.maximum(low - centre, centre - low - side_m), 0.0)
-        if float((outside**2).sum()) >= profile.front_m**2:
-            return None
-        air = np.zeros((BLOCK_SIDE,) * 3, dtype=bool)
-        block = GasGrid(level.cell_m, air, (float(low[0]), float(low[1]), float(low[2])))
-        start, (density, momentum, energy, fuel) = lay(profile, block, charge)
-        values = np.zeros((6, *air.shape))
-        values[0], values[4] = AIR_DENSITY_KG_M3, AIR_PRESSURE_PA / (GAMMA - 1.0)
-        part = tuple(slice(a, a + n) for a, n in zip(start, density.shape, strict=True))
-        values[(slice(None), *part)] = np.stack((density, *momentum, energy, fuel))
-        return np.ascontiguousarray((values / units[:, None, None, None]).transpose(0, 3, 2, 1))
-
-    solver.set_blocks(fill, lambda level: level.near(grid, centre, profile.front_m))
     solver.time_s = profile.time_s
 
 

@@ -24,7 +24,6 @@ from blast_env.site.blast_site import Charge
 from blast_env.store import Store
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
-from studies.bench import LARGE, street
 from studies.gas.cells import CellLoads, cell_loads, difference, engine_with
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
 from studies.gas.definition import LONG_RUNS, LongRun, both_loads
@@ -34,12 +33,10 @@ from studies.gas.judgement import judge as judgement
 from studies.gas.loads import yard
 from studies.gas.oblique import oblique_loads
 from studies.gas.reference import free_field, wide_wall
-from studies.gas.refinement import compare_cells
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 """Side of the cells in comparisons with Kingery and Bulmash, by the mass of the charge in kg."""
 YARD: Final = "yard"
-_STREET_M: Final = 100.0
 
 Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
 Processes = Annotated[int, typer.Option(min=1)]
@@ -253,39 +250,6 @@ def cells(
         charge = draw_charge(site, 0)
         run = partial(cell_loads, site, charge=charge, processes=processes)
         _print_cells(site, charge, random_layouts, (sizes.split(","), finest), run)
-
-
-@app.command()
-def refinement(
-    scenario: Annotated[
-        list[str] | None,
-        typer.Option(help=f"Sites, {LARGE!r} a street of 100 m; courtyard and street_front."),
-    ] = None,
-    sizes: Annotated[
-        str, typer.Option(help="Cells to compare, the reference last: names, or sides in m.")
-    ] = "fine,adaptive,0.25",
-) -> None:
-    """Print loads, cost and memory of choices of cells, over those of the last one."""
-    with user_errors():
-        engines = [engine_with(size) for size in sizes.split(",")]
-        rows = []
-        for name in scenario or ["courtyard", "street_front"]:
-            site = street(_STREET_M) if name == LARGE else load_scenario(name)
-            found = [compare_cells(site, engine) for engine in engines]
-            for row in found:
-                for load, wanted in zip(row.loads, found[-1].loads, strict=True):
-                    rows.append(
-                        (
-                            *(name, load.name, row.cells),
-                            f"{load.impulse_pa_s / wanted.impulse_pa_s:.3f}",
-                            f"{load.peak_pa / wanted.peak_pa:.3f}",
-                            f"{1e-6 * row.cell_updates:.0f}",
-                            f"{row.cpu_s:.1f}",
-                            f"{row.memory_mb:.0f}",
-                        )
-                    )
-        headers = ("site", "structure", "cells", "load", "peak", "million cell updates")
-        print_line(markdown_table((*headers, "CPU (s)", "memory (MB)"), rows))
 
 
 def _print_cells(

@@ -137,7 +137,6 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.gas definition": "--scenario control_room --until 0.05",
     "python -m studies.gas ending": "--generated 0 --times 1.1",
-    "python -m studies.gas refinement": "--scenario hotel_forecourt --sizes adaptive,0.5",
     "python -m studies.gas oblique": "--angles 20 --until 0.02",
     "python -m studies.gas cells --scenario visitor_entrance --random-layouts 0 --finest 0.125": (
         "--sizes 0.5 --finest 0.5"

@@ -68,11 +68,6 @@ def test_final_cells_are_uniform_up_to_40_m_and_grow_beyond() -> None:
         (GasEngine(cell_m=0.125, until="walls"), GasEngine(cell_m=0.25, until="walls")),
         (GasEngine(cells="fine"), GasEngine(cells="coarse")),
         (GasEngine(cells="fine", cell_m=0.125), GasEngine(cells="coarse", cell_m=0.25)),
-        (GasEngine(cells="adaptive"), GasEngine(cells="coarse")),
-        (
-            GasEngine(cells="adaptive", cell_m=0.125),
-            GasEngine(cells="adaptive", cell_m=0.25),
-        ),
         (GasEngine(cell_m=0.5), None),
         (GasEngine(cells="coarse"), None),
         (GasEngine(cell_m=0.5 / 3), None),

@@ -59,8 +59,7 @@ class TrainingSettings(BaseModel):
         engine: Engine of the blasts; `"surrogate"` or a surrogate's file for predictions instead
             of blasts.
         cell_m: Side of the cells of gas dynamics; by default the engine's.
-        cells: Growth of the cells: `"uniform"`, `"coarse"`, `"fine"` or `"adaptive"`; by default
-            the engine's.
+        cells: Growth of the cells: `"uniform"`, `"coarse"` or `"fine"`; by default the engine's.
         observation: Name of the observation; see `BlastBarrier-v0`.
         hidden_threats: Charges per episode with a hidden threat. The expected reward does not
             depend on it; with few charges, the same number of blasts covers more layouts.

@@ -141,8 +141,7 @@ class BayLoads:
     def known(self, run: "GasRun") -> dict[str, bool]:
         """Return whether the load of each bay was known at the end of the run, by its name."""
         names = [structure.name for structure in run.site.structures]
-        # Bays off the ways that adaptive cells follow have peaks that are too low: not known.
-        come = {name: run.has_come(k) and run.follows(k) for k, name in enumerate(names)}
+        come = {name: run.has_come(index) for index, name in enumerate(names)}
         net = impulses(*self.histories)
         known = is_known(net.max(axis=1, initial=0.0), net[:, -1])
         return {

@@ -42,7 +42,6 @@ from blast_env.evaluation.validation import (
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
 from blast_env.gas.settings import (
-    ADAPTIVE_CELL_M,
     FACE_NAMES,
     GasSettings,
     distance_unchecked,
@@ -94,7 +93,6 @@ _AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
 _PROGRESS_CALLS: Final = 100
 
 _FLOORED: Final = "{} cells were raised to the floor of pressure"
-_NOT_FOLLOWED: Final = "adaptive cells follow fronts to protected structures: peaks here are low"
 _SEEN_FACES: Final = 200  # of a structure, most for the share in sight
 
 _FINAL_CELL_M: Final = 0.25
@@ -181,9 +179,7 @@ class GasEngine(GasSettings, Engine):
         modules = MODULE_SIDE_M / cell_m
         if modules < 1.0 - 1e-9 or abs(modules - round(modules)) > 1e-9:
             return None
-        if self.is_growing or (self.is_adaptive and cell_m > ADAPTIVE_CELL_M + 1e-9):
-            return replace(self, cell_m=cell_m, cells="coarse")
-        return replace(self, cell_m=cell_m)
+        return replace(self, cell_m=cell_m, cells="coarse" if self.is_growing else self.cells)
 
     @property
     def words(self) -> str:
@@ -506,8 +502,6 @@ class GasResult:
         own = own[np.linspace(0, len(own) - 1, min(len(own), _SEEN_FACES)).astype(int)]
         outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
         seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
-        if not self.run.follows(index):
-            return Validation(ValidationStatus.APPROXIMATE, _NOT_FOLLOWED)
         if run.solver.floored_cells:
             return Validation(
                 ValidationStatus.APPROXIMATE, _FLOORED.format(run.solver.floored_cells)
@@ -647,8 +641,6 @@ class GasResult:
             waited = self.end_reason is not EndReason.LOADS_KNOWN
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
             notes.append(f"{NOT_KNOWN}: {why}")
-        if not self.run.follows(index):
-            notes.append(_NOT_FOLLOWED)
         if self.run.solver.floored_cells:
             notes.append(_FLOORED.format(self.run.solver.floored_cells))
         return tuple(notes)

@@ -77,7 +77,7 @@ def simulate(
             0.5 m unless given; `until`, the loads that a blast waits for, protected
             `"structures"` (the default), all `"walls"` or the `"gauges"`, or its duration in
             seconds; `cells`, their growth with the blast, `"uniform"` (the default, no growth),
-            `"coarse"`, `"fine"` or `"adaptive"`, for large sites; see `GasSettings`.
+            `"coarse"` or `"fine"`, for large sites; see `GasSettings`.
 
     Returns:
         A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.

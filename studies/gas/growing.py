@@ -1,4 +1,4 @@
-"""Loads, cost and memory of blasts on cells of several sizes, over those of uniform cells."""
+"""Loads, cost and memory of blasts on cells that grow, over those of uniform cells."""
 
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
