@@ -10,11 +10,11 @@ from blast_env.answers.advise import advice_answer, advice_figure
 from blast_env.answers.terminal import print_parts
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
+    CELLS_HELP,
     FINAL_CELLS,
     TARGET_HELP,
     CacheOption,
     CellOption,
-    CellsOption,
     ChargeInput,
     ChargeOption,
     DrawsOption,
@@ -36,7 +36,7 @@ from blast_env.design.search.advised import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
-from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
+from blast_env.evaluation.engines import JUDGE, choosing_engine, final_engine
 from blast_env.layout import write_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
@@ -61,7 +61,9 @@ def advise(
     rounds: int = typer.Option(ROUNDS, help="Most searches for each kind.", min=1),
     seed: int = typer.Option(0, help="Seed of the draws.", min=0),
     cell_m: CellOption = None,
-    cells: CellsOption = None,
+    cells: str | None = typer.Option(
+        None, help=CELLS_HELP, show_default="coarse on sites wider than 40 m, else uniform"
+    ),
     judge_cell_m: float | None = typer.Option(
         None,
         "--judge-cell",
@@ -78,10 +80,11 @@ def advise(
     """Compare the protection for a budget: stand-off, shielding, hardening, and all combined.
 
     For each kind the command searches for the cheapest layout that reaches the target, by gas
-    dynamics, or for the one with the least shortfall if none does. The layouts found are judged
-    again with finer cells, and with peaks as sharp as Kingery and Bulmash's: cells clip peaks, and
-    those of 0.5 m halve them. If a layout fails there, the search is repeated with a margin to the
-    target. Hardening needs no further blasts.
+    dynamics with cells twice as large as those of final statements, or for the one with the least
+    shortfall if none does. The layouts found are judged again with final cells, and with peaks as
+    sharp as Kingery and Bulmash's: cells clip peaks, and those of 0.5 m halve them. If a layout
+    fails there, the search is repeated with a margin to the target. Hardening needs no further
+    blasts.
     """
     level = wanted_level(target, load_scenario(scenario), LevelOfProtection.MEDIUM)
     site = site_with_target(load_scenario(scenario), level, target_probability, budget_cost)
@@ -90,7 +93,7 @@ def advise(
         raise BlastEnvError(
             f"budget is {budget} blasts, must be at least {len(threats)}: one per charge"
         )
-    engine = find_engine(JUDGE, cell_m, cells=cells)
+    engine = choosing_engine(JUDGE, [site], cell_m, cells)
     judge = final_engine(JUDGE, [site], judge_cell_m)
     evaluator = BlastEvaluator(site, engine, cache=cache)
     problem = DesignProblem(evaluator, LoadCaseSet(site, threats), processes)

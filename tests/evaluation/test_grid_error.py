@@ -10,7 +10,7 @@ from blast_env.answers.document import TYPOGRAPHIC, Number, percent, worse
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, evaluate_layout
 from blast_env.evaluation.cases import LoadCaseSet, draw_threats
-from blast_env.evaluation.engines import final_engine, find_engine
+from blast_env.evaluation.engines import choosing_engine, final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.questions.grid_error import convergence_index
 from blast_env.site import load_scenario
@@ -59,6 +59,15 @@ def test_final_cells_are_uniform_up_to_40_m_and_grow_beyond() -> None:
     assert final_engine("gas", [small], cells="coarse") == GasEngine(cells="coarse")
     assert final_engine(GasEngine(), [wide]) == GasEngine()
     assert final_engine("event", [small]) == find_engine("event")
+
+
+def test_layouts_are_chosen_on_cells_twice_as_large() -> None:
+    small, wide = load_scenario("courtyard"), load_scenario("street_front")
+    assert choosing_engine("gas", [small]) == GasEngine()
+    assert choosing_engine("gas", [wide]) == GasEngine(cells="coarse")
+    assert choosing_engine("gas", [wide], 0.5) == GasEngine()
+    assert choosing_engine("gas", [wide], cells="fine") == GasEngine(cells="fine")
+    assert choosing_engine("event", [wide]) == find_engine("event")
 
 
 @pytest.mark.parametrize(

@@ -332,6 +332,21 @@ def final_engine(
     return found if is_given else found.final(scenarios)
 
 
+def choosing_engine(
+    engine: str | Engine,
+    scenarios: Sequence[Scenario],
+    cell_m: float | None = None,
+    cells: str | None = None,
+) -> Engine:
+    """Return the engine that chooses layouts for final statements, or that with the given cells.
+
+    Its cells are twice as large as those of the statements. Errors are those of `find_engine`.
+    """
+    final = final_engine(engine, scenarios, cell_m, cells)
+    is_given = cell_m is not None or cells is not None
+    return final if is_given else final.coarser or final
+
+
 def _made(name: str) -> Engine:
     if name in _PLACES:
         own: Engine = load_plugin(_PLACES[name])()
