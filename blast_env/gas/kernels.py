@@ -17,8 +17,8 @@ sweep along x marches through the vectors of a row, and shifts them by a lane to
 Where lanes differ, values are selected without branches.
 
 The ghost state of a cell is its mirror image beside a solid cell, and its copy beside an open face.
-A sweep changes only cells within the extent of each plane. Those outside are still air or no gas,
-so that nothing flows between them.
+A sweep moves only vectors with a cell of air and of the extent of their row. Outside the extent is
+still air or no gas, so that nothing flows there.
 
 All kernels are in one file, because Numba's cache is invalidated by changes of the file of the
 function called from Python, and by no others.
@@ -53,7 +53,7 @@ from blast_env.gas.simd import (
     with_first_of,
     with_last_of,
 )
-from blast_env.gas.state import DENSITY, ENERGY, FUEL, FUSED, GAMMA, X_MOMENTUM, Reals
+from blast_env.gas.state import DENSITY, ENERGY, FUEL, FUSED, GAMMA, X_MOMENTUM, Extent, Reals
 
 Variables = tuple[Any, Any, Any, Any, Any, Any]
 """Vectors of density, velocity along the axis of a sweep and along the next two in cyclic order,
@@ -94,7 +94,7 @@ def _variables(state: Any, cells: int, at: int, axis: int, fuel: bool) -> tuple[
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def safe_variables(
+def _safe_variables(
     state: Any, cells: int, at: int, axis: int, fuel: bool, notes: Any
 ) -> tuple[Variables, Any]:
     """Return the variables after raising density and pressure to the floor."""
@@ -151,7 +151,7 @@ def _half_slope(low: Any, here: Any, high: Any, quarter: Any, zero: Any) -> Any:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
+def _ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
     """Return own variables of cells of air, and elsewhere the image of the others.
 
     `side` is the factor of the normal velocity: -1 in a mirror, 1 beyond an open face.
@@ -167,7 +167,7 @@ def ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def at_faces(
+def _at_faces(
     state: Any,
     low: Variables,
     here: Variables,
@@ -223,7 +223,7 @@ def at_faces(
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) -> Variables:
+def _hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) -> Variables:
     """Return the fluxes through faces from the variables on their two sides.
 
     Args:
@@ -293,7 +293,7 @@ def hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) -
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def update(
+def _update(
     state: Any,
     cells: int,
     at: int,
@@ -339,7 +339,7 @@ def _record_walls(flux: Any, vector: int, recorded: Any, work: Any) -> None:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
+def _note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
     """Keep the largest speeds of signals along any axis."""
     _, u, v, w, p, _ = here
     most = larger(larger(size(u), size(v)), size(w))
@@ -348,7 +348,7 @@ def note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def still_air(state: Any, still: Any) -> Variables:
+def _still_air(state: Any, still: Any) -> Variables:
     """Return the variables of still air."""
     zero = fill(state, 0.0)
     p = fill(state, GAMMA - 1.0) * fill(state, get(still, ENERGY))
@@ -363,6 +363,7 @@ def _sweep_across(
     first: int,
     end: int,
     axis: int,
+    ahead: int,
     fuel: bool,
     measure: bool,
     ratio: Any,
@@ -377,47 +378,47 @@ def _sweep_across(
         first: Coordinate of the first vector.
         end: That of the last one + 1.
         axis: The axis.
+        ahead: Distance of the vectors to be moved later, which are loaded into the cache.
         fuel: Whether the state has fuel.
         measure: Whether to note the speeds of signals.
         ratio: Ratio of time step to cell side.
         recorded: Places of the pressures and tables of recorded faces.
     """
     state, code, still, narrow, work, notes, cells = gas
-    air, zero = still_air(state, still), fill(state, 0.0)
+    air, zero = _still_air(state, still), fill(state, 0.0)
     vectors = axis * (cells // lanes_at(state))
     low, before, flux_before, ratio_before = air, air, air, zero
     at = begin + first * stride
-    here, per_r = safe_variables(state, cells, at, axis, fuel, notes)
+    here, per_r = _safe_variables(state, cells, at, axis, fuel, notes)
     for m in range(first, end + 1):
         high, per_r_high, below, above, ratio_here = air, per_r, air, air, zero
-        # Rows lie far apart in memory: begin to load the next vector of this one.
         for k in range(FUEL + fuel):
-            fetch(state, k * cells + at + stride + lanes_at(state))
+            fetch(state, k * cells + at + ahead)
         is_clear = all_zero(state, code, at - stride) and all_zero(state, code, at)
         if m < end:
             if measure:
-                note_signals(state, here, per_r, work)
+                _note_signals(state, here, per_r, work)
             if m + 1 < end:
-                high, per_r_high = safe_variables(state, cells, at + stride, axis, fuel, notes)
+                high, per_r_high = _safe_variables(state, cells, at + stride, axis, fuel, notes)
             low_image, high_image = low, high
             if not (is_clear and all_zero(state, code, at + stride)):
                 side_low = load_codes(state, code, at - stride)
                 side_high = load_codes(state, code, at + stride)
-                low_image = ghost(side_low == zero, low, here, side_low)
-                high_image = ghost(side_high == zero, high, here, side_high)
+                low_image = _ghost(side_low == zero, low, here, side_low)
+                high_image = _ghost(side_high == zero, high, here, side_high)
             ratio_here = fill(state, ratio * get(narrow, m))
-            below, above = at_faces(state, low_image, here, high_image, per_r, ratio_here, fuel)
+            below, above = _at_faces(state, low_image, here, high_image, per_r, ratio_here, fuel)
         left, right, wall = before, below, zero
         if not is_clear:
             side_left = load_codes(state, code, at - stride)
             side_right = load_codes(state, code, at)
-            left = ghost(side_left == zero, before, below, side_left)
-            right = ghost(side_right == zero, below, before, side_right)
+            left = _ghost(side_left == zero, before, below, side_left)
+            right = _ghost(side_right == zero, below, before, side_right)
             wall = side_left + side_right
-        flux = hllc(state, left, right, wall, fuel)
+        flux = _hllc(state, left, right, wall, fuel)
         _record_walls(flux[1], vectors + at // lanes_at(state), recorded, work)
         if m > first:
-            update(state, cells, at - stride, axis, fuel, code, ratio_before, flux_before, flux)
+            _update(state, cells, at - stride, axis, fuel, code, ratio_before, flux_before, flux)
         low, here, per_r, before, flux_before = here, high, per_r_high, above, flux
         ratio_before = ratio_here
         at += stride
@@ -455,6 +456,7 @@ def _sweep_along(
     begin: int,
     first: int,
     end: int,
+    ahead: int,
     fuel: bool,
     measure: bool,
     ratio: Any,
@@ -466,18 +468,20 @@ def _sweep_along(
     """
     state, code, still, narrow, work, notes, cells = gas
     lanes = lanes_at(state)
-    air, zero, step = still_air(state, still), fill(state, 0.0), fill(state, ratio)
+    air, zero, step = _still_air(state, still), fill(state, 0.0), fill(state, ratio)
     flux_still = (zero, air[4], zero, zero, zero, zero)
     before, above_before, flux_before = air, air, flux_still
     at = begin + first * lanes
-    here, per_r = safe_variables(state, cells, at, 0, fuel, notes)
+    here, per_r = _safe_variables(state, cells, at, 0, fuel, notes)
     for m in range(first, end + 1):
+        for k in range(FUEL + fuel):
+            fetch(state, k * cells + at + ahead)
         after, per_r_after, above, flux = air, per_r, air, flux_still
         if m < end:
             if measure:
-                note_signals(state, here, per_r, work)
+                _note_signals(state, here, per_r, work)
             if m + 1 < end:
-                after, per_r_after = safe_variables(state, cells, at + lanes, 0, fuel, notes)
+                after, per_r_after = _safe_variables(state, cells, at + lanes, 0, fuel, notes)
             low, high = _one_lower(before, here), _one_higher(here, after)
             is_clear = (
                 all_zero(state, code, at - 1)
@@ -488,21 +492,21 @@ def _sweep_along(
             if not is_clear:
                 side_low, side_here = load_codes(state, code, at - 1), load_codes(state, code, at)
                 side_high = load_codes(state, code, at + 1)
-                low = ghost(side_low == zero, low, here, side_low)
-                high = ghost(side_high == zero, high, here, side_high)
+                low = _ghost(side_low == zero, low, here, side_low)
+                high = _ghost(side_high == zero, high, here, side_high)
             ratio_here = step * load(narrow, m * lanes)
-            below, above = at_faces(state, low, here, high, per_r, ratio_here, fuel)
+            below, above = _at_faces(state, low, here, high, per_r, ratio_here, fuel)
             left, right = _one_lower(above_before, above), below
             if not is_clear:
                 left, right = (
-                    ghost(side_low == zero, left, right, side_low),
-                    ghost(side_here == zero, right, left, side_here),
+                    _ghost(side_low == zero, left, right, side_low),
+                    _ghost(side_here == zero, right, left, side_here),
                 )
-            flux = hllc(state, left, right, side_low + side_here, fuel)
+            flux = _hllc(state, left, right, side_low + side_here, fuel)
             _record_walls(flux[1], at // lanes, recorded, work)
         if m > first:
             ratio_before = step * load(narrow, (m - 1) * lanes)
-            update(
+            _update(
                 state, cells, at - lanes, 0, fuel, code, ratio_before, flux_before,
                 _one_higher(flux_before, flux),
             )  # fmt: skip
@@ -510,25 +514,108 @@ def _sweep_along(
         at += lanes
 
 
-@njit(error_model="numpy", fastmath=FUSED)
-def _slice_at(extent: Any, planes: int, y: int) -> tuple[int, int, int, int]:
-    """Return first and last + 1 cells along z and x of an extent at a y; zeros if it has none."""
-    z0, z1, x0, x1 = 0, 0, 0, 0
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
+def _sweep_rows(
+    gas: Any,
+    bounds: Any,
+    shape: tuple[int, int, int],
+    y: int,
+    is_first: bool,
+    fuel: bool,
+    measure: bool,
+    ratio: Any,
+    recorded: Any,
+) -> None:
+    """Move the gas along x in the rows of all planes at a y.
+
+    Before the other sweep of the layer, the next layer is loaded into the cache; after it, the next
+    row. A run of vectors ends with the first one without air: it holds the face before it.
+    """
+    extent, airy = bounds
+    planes, rows, length = shape
+    lanes = lanes_at(gas[0])
+    vectors = length // lanes
+    ahead = length if is_first else rows * length
     for z in range(planes):
-        if get(extent, 4 * z) <= y < get(extent, 4 * z + 1):
-            if z1 == 0:
-                z0, x0, x1 = z, get(extent, 4 * z + 2), get(extent, 4 * z + 3)
-            z1 = z + 1
-            x0, x1 = min(x0, get(extent, 4 * z + 2)), max(x1, get(extent, 4 * z + 3))
-    return z0, z1, x0, x1
+        row = z * rows + y
+        x0, x1 = get(extent, 2 * row), get(extent, 2 * row + 1)
+        if x1 == 0:
+            continue
+        # The cells at both ends are outside the extent.
+        first, last = (x0 - 1) // lanes, x1 // lanes + 1
+        while first < last:
+            while first < last and get(airy, row * vectors + first) == 0:
+                first += 1
+            end = first
+            while end < last and get(airy, row * vectors + end) != 0:
+                end += 1
+            if first < end:
+                end = min(end + 1, last)
+                _sweep_along(gas, row * length, first, end, ahead, fuel, measure, ratio, recorded)
+            first = end
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
+def _sweep_columns(
+    gas: Any,
+    bounds: Any,
+    shape: tuple[int, int, int],
+    layer: int,
+    axis: int,
+    is_first: bool,
+    fuel: bool,
+    measure: bool,
+    ratio: Any,
+    recorded: Any,
+) -> None:
+    """Move the gas along y in a plane, or along z in the rows of all planes at a y.
+
+    Before the other sweep of the layer, the next layer is loaded into the cache; otherwise the next
+    vectors of the rows, which lie far apart in memory.
+    """
+    extent, airy = bounds
+    planes, rows, length = shape
+    lanes = lanes_at(gas[0])
+    vectors = length // lanes
+    # 1. The rows across which the gas moves, and the vectors of their extents.
+    begin, apart, count = (layer * rows, 1, rows) if axis == 1 else (layer, rows, planes)
+    m0, m1, v0, v1 = count, 0, vectors, 0
+    for m in range(count):
+        row = begin + m * apart
+        x0, x1 = get(extent, 2 * row), get(extent, 2 * row + 1)
+        if x1 > 0:
+            m0, m1 = min(m0, m), m + 1
+            v0, v1 = min(v0, x0 // lanes), max(v1, (x1 - 1) // lanes + 1)
+    ahead = length if is_first else apart * length + lanes
+    # 2. The runs of vectors with air in their extent, one behind the other.
+    for v in range(v0, v1):
+        m = m0
+        while m < m1:
+            first = m
+            while m < m1 and _has_gas(extent, airy, begin + m * apart, v, vectors, lanes):
+                m += 1
+            if first < m:
+                _sweep_across(
+                    gas, begin * length + v * lanes, apart * length, first, m, axis, ahead, fuel,
+                    measure, ratio, recorded,
+                )  # fmt: skip
+            m += 1
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
+def _has_gas(extent: Any, airy: Any, row: int, v: int, vectors: int, lanes: int) -> bool:
+    """Return whether a vector of a row has a cell of its extent, and air."""
+    overlaps = get(extent, 2 * row) < (v + 1) * lanes and get(extent, 2 * row + 1) > v * lanes
+    return overlaps and get(airy, row * vectors + v) != 0
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _sweep(
     gas: Any,
+    narrow: Any,
+    bounds: Any,
     shape: tuple[int, int, int],
-    extent: Any,
-    axis: int,
+    axes: tuple[int, int],
     first: int,
     end: int,
     fuel: bool,
@@ -536,37 +623,30 @@ def _sweep(
     ratio: Any,
     recorded: Any,
 ) -> None:
-    """Move the gas along an axis in the layers from first to end; see `sweep`."""
-    planes, rows, length = shape
-    lanes = lanes_at(gas[0])
+    """Move the gas in the layers from first to end; see `sweep`."""
+    state, code, still, work, notes, cells = gas
+    along_x, along_y, along_z = narrow
     for k in range(first, end):
-        if axis == 2:
-            m0, m1, x0, x1 = _slice_at(extent, planes, k)
-        else:
-            m0, m1 = get(extent, 4 * k), get(extent, 4 * k + 1)
-            x0, x1 = get(extent, 4 * k + 2), get(extent, 4 * k + 3)
-        if m0 == m1:
-            continue
-        if axis == 0:
-            for y in range(m0, m1):
-                row = (k * rows + y) * length
-                # Both ends are outside the extent.
-                _sweep_along(
-                    gas, row, (x0 - 1) // lanes, x1 // lanes + 1, fuel, measure, ratio, recorded
-                )
-        else:
-            begin = k * rows * length if axis == 1 else k * length
-            stride = length if axis == 1 else rows * length
-            for x in range(x0 // lanes * lanes, x1, lanes):
-                _sweep_across(gas, begin + x, stride, m0, m1, axis, fuel, measure, ratio, recorded)
+        for number in range(2):
+            axis = axes[number]
+            is_first = number == 0 and axes[1] >= 0
+            last = measure and (number == 1 or axes[1] < 0)
+            if axis == 0:
+                own = state, code, still, along_x, work, notes, cells
+                _sweep_rows(own, bounds, shape, k, is_first, fuel, last, ratio, recorded)
+            elif axis > 0:
+                across = along_y if axis == 1 else along_z
+                own = state, code, still, across, work, notes, cells
+                _sweep_columns(own, bounds, shape, k, axis, is_first, fuel, last, ratio, recorded)
 
 
 @njit(forceinline=False, error_model="numpy", fastmath=FUSED)
 def _sweep_with_fuel(
     gas: Any,
+    narrow: Any,
+    bounds: Any,
     shape: tuple[int, int, int],
-    extent: Any,
-    axis: int,
+    axes: tuple[int, int],
     first: int,
     end: int,
     measure: bool,
@@ -574,15 +654,16 @@ def _sweep_with_fuel(
     recorded: Any,
 ) -> None:
     own_frame()
-    _sweep(gas, shape, extent, axis, first, end, True, measure, ratio, recorded)
+    _sweep(gas, narrow, bounds, shape, axes, first, end, True, measure, ratio, recorded)
 
 
 @njit(forceinline=False, error_model="numpy", fastmath=FUSED)
 def _sweep_without_fuel(
     gas: Any,
+    narrow: Any,
+    bounds: Any,
     shape: tuple[int, int, int],
-    extent: Any,
-    axis: int,
+    axes: tuple[int, int],
     first: int,
     end: int,
     measure: bool,
@@ -590,20 +671,23 @@ def _sweep_without_fuel(
     recorded: Any,
 ) -> None:
     own_frame()
-    _sweep(gas, shape, extent, axis, first, end, False, measure, ratio, recorded)
+    _sweep(gas, narrow, bounds, shape, axes, first, end, False, measure, ratio, recorded)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def sweep(
     state: Reals,
     code: NDArray[np.int8],
-    extent: NDArray[np.int64],
-    axis: int,
+    airy: NDArray[np.int8],
+    extent: Extent,
+    axes: tuple[int, int],
     first: int,
     end: int,
     measure: bool,
     ratio: Any,
-    narrow: Reals,
+    narrow_x: Reals,
+    narrow_y: Reals,
+    narrow_z: Reals,
     still: Reals,
     pressure: Reals,
     walls: NDArray[np.int32],
@@ -611,19 +695,24 @@ def sweep(
     work: Reals,
     notes: NDArray[np.float64],
 ) -> None:
-    """Move the gas along an axis in the layers from first to end, and in no others.
+    """Move the gas along one or two axes in the layers from first to end, and in no others.
+
+    Layers are planes for the axis y, and for x and z the rows at a y in all planes: sweeps along
+    both move a layer along one and then along the other, while it is in the cache.
 
     Args:
         state: The state (5 or 6, z, y, x), updated in place; rows are whole vectors.
         code: Codes of the cells (z, y, x).
-        extent: First and last + 1 cells along y and x of each plane, outside which air is still
-            (z, 4).
-        axis: The axis, 0 for x.
-        first: First plane, or for a sweep along z, first row in all planes.
-        end: Last plane or row + 1.
-        measure: Whether to note the speeds of signals.
+        airy: Whether vectors have a cell of air (z, y, vectors).
+        extent: Cells outside which air is still, extended along the axes (z, y, 2).
+        axes: The axes of the sweeps, 0 for x: y and -1, or x and z in any order.
+        first: First layer.
+        end: Last layer + 1.
+        measure: Whether to note the speeds of signals in the last sweep.
         ratio: Ratio of time step to cell side.
-        narrow: Ratio of cell side to the width of each cell along the axis.
+        narrow_x: Ratio of cell side to the width of each cell along x.
+        narrow_y: The same along y.
+        narrow_z: The same along z.
         still: State of still air (5 or 6,).
         pressure: Pressures on the recorded faces, updated in place.
         walls: Lane of the cell on the high side, and index of the face, vector by vector (k, 2).
@@ -632,20 +721,16 @@ def sweep(
         notes: Fastest signal and number of cells raised to the floor; updated in place (2,).
     """
     work[1] = 0.0
-    gas = (
-        place(state),
-        place(code),
-        place(still),
-        place(narrow),
-        place(work),
-        place(notes),
-        code.size,
-    )
+    gas = (place(state), place(code), place(still), place(work), place(notes), code.size)
+    narrow = (place(narrow_x), place(narrow_y), place(narrow_z))
+    bounds = (place(extent), place(airy))
     recorded = (place(pressure), place(walls), place(first_wall))
     if len(state) > FUEL:
-        _sweep_with_fuel(gas, code.shape, place(extent), axis, first, end, measure, ratio, recorded)
+        _sweep_with_fuel(
+            gas, narrow, bounds, code.shape, axes, first, end, measure, ratio, recorded
+        )
     else:
         _sweep_without_fuel(
-            gas, code.shape, place(extent), axis, first, end, measure, ratio, recorded
+            gas, narrow, bounds, code.shape, axes, first, end, measure, ratio, recorded
         )
     notes[0] = max(notes[0], work[1].max())

@@ -29,11 +29,12 @@ _FIRST_SHARE: Final = 0.2
 _COOL_EVERY: Final = 4
 """Number of steps between two searches for gas that is too hot."""
 
-_ORDERS: Final = ((0, 2, 1), (1, 2, 0))
+_SWEEPS: Final = (((0, 2), (1, -1)), ((1, -1), (2, 0)))
 """Axes of the sweeps of a step, in turn: x, z, y, and the reverse for second order in time.
 
-With z in the middle x and y are alike: a quarter turn of a site changes its loads by less than
-0.1 % (`tests/gas/test_symmetry.py`).
+Those along x and z move the rows at a y along both, while they are in the cache. With z in the
+middle x and y are alike: a quarter turn of a site changes its loads by less than 0.1 %
+(`tests/gas/test_symmetry.py`).
 """
 
 _CELLS_PER_CALL: Final = 3_000_000
@@ -156,8 +157,7 @@ class GasSolver:
         wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
             They are the fluxes of momentum, so that their integral is exactly the momentum taken
             up by the wall.
-        extent: Cells of `state` outside which the air is still: first and last + 1 along y and x in
-            each plane; zeros in a plane of still air (z, 4).
+        extent: Cells of `state` outside which the air is still (z, y, 2); see `state.Extent`.
 
     Raises:
         BlastEnvError: If an argument is out of bounds.
@@ -225,13 +225,15 @@ class GasSolver:
         self.state[:] = self._still[:, None, None, None]
         self.wall_pressure: Reals = np.ones(len(faces), dtype=dtype)
         lanes = lanes_of(self.state.itemsize)
+        airy = (self._code == state.AIR).reshape(*self._code.shape[:2], -1, lanes).any(axis=3)
+        self._airy = airy.astype(np.int8)
         self._walls, self._first_wall = faces.kernel_table(grid, self._code.shape, lanes)
         self._work = [np.zeros((kernels.WORK_ROWS, lanes), dtype=dtype) for _ in range(threads)]
         self._narrow = [grid.narrowness(axis).astype(dtype) for axis in range(3)]
         self._narrow[0] = np.pad(self._narrow[0], beyond[2], mode="edge")
         self._notes = np.zeros((threads, 2))
-        self._whole = np.zeros((len(self._code), 4), dtype=np.int64)
-        self._whole[MARGIN:-MARGIN] = [bound for n in (ny, nx) for bound in (MARGIN, n - MARGIN)]
+        self._whole = np.zeros((*self._code.shape[:2], 2), dtype=np.int32)
+        self._whole[MARGIN:-MARGIN, MARGIN : ny - MARGIN] = MARGIN, nx - MARGIN
         self.extent = np.zeros_like(self._whole) if skip_still_air else self._whole.copy()
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self._signal = 0.0
@@ -284,7 +286,7 @@ class GasSolver:
         self._signal = 0.0
         if self._skip:
             self.extent = self._whole.copy()
-            state.tighten(self.state, self._still, self.extent, max(self._code.shape))
+            state.tighten(self.state, self._still, self.extent)
 
     def advance(self, until_s: float, *, land: bool = False) -> None:
         """Continue until the simulated time is at least `until_s`.
@@ -307,12 +309,12 @@ class GasSolver:
         step_s = min(reduced / self.velocity_m_s, most_s)
         ratio = self.state.dtype.type(step_s * self.velocity_m_s / self.grid.cell_m)
         self._notes[:] = 0.0
-        order = _ORDERS[self.steps % len(_ORDERS)]
-        for axis in order:
-            cells = self._sweep(axis, ratio, last=axis == order[-1])
+        sweeps = _SWEEPS[self.steps % len(_SWEEPS)]
+        for axes in sweeps:
+            cells = self._sweep(axes, ratio, last=axes == sweeps[-1])
         self.cell_updates += cells
         if self._skip:
-            state.tighten(self.state, self._still, self.extent, max(self._code.shape))
+            state.tighten(self.state, self._still, self.extent)
         if self._burning is not None:
             self._burn(self._burning, step_s)
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
@@ -357,7 +359,7 @@ class GasSolver:
         other._signal = self._signal
         if self._skip:
             other.extent = other._whole.copy()
-            state.tighten(other.state, other._still, other.extent, max(other._code.shape))
+            state.tighten(other.state, other._still, other.extent)
         return other
 
     def density(self) -> NDArray[np.float64]:
@@ -408,22 +410,29 @@ class GasSolver:
             fuel_kg=self.density_kg_m3 * sums[state.FUEL] if len(sums) > state.FUEL else 0.0,
         )
 
-    def _sweep(self, axis: int, ratio: Any, *, last: bool) -> int:
-        """Move the gas along an axis; return the number of cells."""
+    def _sweep(self, axes: tuple[int, int], ratio: Any, *, last: bool) -> int:
+        """Move the gas along one or two axes; return the number of cells."""
+        own = [axis for axis in axes if axis >= 0]
         if self._skip:
-            state.widen(self.extent, self._whole, axis)
+            for axis in own:
+                state.widen(self.extent, self._whole, axis)
+
+        narrow_x, narrow_y, narrow_z = self._narrow
 
         def move(k: int, first: int, end: int) -> None:
             kernels.sweep(
                 self.state,
                 self._code,
+                self._airy,
                 self.extent,
-                axis,
+                axes,
                 first,
                 end,
                 last,
                 ratio,
-                self._narrow[axis],
+                narrow_x,
+                narrow_y,
+                narrow_z,
                 self._still,
                 self.wall_pressure,
                 self._walls,
@@ -432,11 +441,11 @@ class GasSolver:
                 self._notes[k],
             )
 
-        first, end, cells = state.layers_of(self.extent, axis)
-        if self._threads == 1 and cells <= _CELLS_PER_CALL:
+        first, end, cells = state.layers_of(self.extent, 1 if len(own) > 1 else 2)
+        if self._threads == 1 and len(own) * cells <= _CELLS_PER_CALL:
             move(0, first, end)
         else:
-            self._share_out(move, first, end, cells)
+            self._share_out(move, first, end, len(own) * cells)
         return cells
 
     def _burn(self, burning: Burning, step_s: float) -> None:
