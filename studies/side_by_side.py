@@ -137,13 +137,13 @@ def single(scenario: str) -> Measure:
 # ---- Blasts.
 
 
-def gas_blast(scenario: str, cell_m: float = 0.5) -> Measure:
+def gas_blast(scenario: str, cells: str = "uniform") -> Measure:
     """Return a timer of a blast by gas dynamics without a barrier, from scenario to loads."""
     import blast_env
 
     def measure() -> tuple[float, int]:
         began = process_time()
-        blast_env.simulate(scenario, engine="gas", cell_m=cell_m).loads()
+        blast_env.simulate(scenario, engine="gas", cells=cells).loads()
         return process_time() - began, 1
 
     measure()
@@ -154,6 +154,7 @@ _GAS_SITES: Final = (
     *("visitor_entrance", "control_room", "school_and_clinic", "hotel_forecourt"),
     *("shopping_street", "courtyard"),
 )
+_LARGE_SITE: Final = "street_front"
 
 ROWS: Final[Mapping[str, Row]] = MappingProxyType(
     {
@@ -166,6 +167,14 @@ ROWS: Final[Mapping[str, Row]] = MappingProxyType(
         **{
             f"gas-{name}": Row(f"gas, {name}, 0.5 m", "blasts", partial(gas_blast, name))
             for name in _GAS_SITES
+        },
+        **{
+            f"{cells}-{_LARGE_SITE}": Row(
+                f"gas, {_LARGE_SITE}, {cells} cells",
+                "blasts",
+                partial(gas_blast, _LARGE_SITE, cells),
+            )
+            for cells in ("coarse", "fine")
         },
     }
 )
