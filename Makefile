@@ -46,7 +46,8 @@ MATRIX_PYTHON = out/matrix/$*/bin/python
 # and other numbers of threads. tests/digests.py says what a digest depends on.
 ROUNDING := default avx2 avx512 generic kernels no-fma one-thread four-threads
 ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents design gas response studies test_gas.py)
-# The doors to agents, each with the extra that it needs; they cannot be installed together.
+# The doors to agents, each with the extra that it needs; they cannot be installed together. Their
+# extras pin them, and not constraints.txt, whose versions OpenEnv's packages do not all take.
 DOORS := mcp openenv
 matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%) $(DOORS:%=matrix-%)
 
@@ -69,7 +70,7 @@ $(ROUNDING:%=matrix-%): matrix-%: $(STAMP)
 $(DOORS:%=matrix-%): matrix-%: $(VENV)/.uv
 	mkdir -p out/matrix
 	$(BIN)/uv venv --quiet --clear --python $(PYTHON) out/matrix/$*
-	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) -e ".[$*,render]" -c constraints.txt
+	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) -e ".[$*,render]"
 	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) $(MATRIX_TOOLS)
 	$(MATRIX_PYTHON) -m pytest --numprocesses auto -rs tests/tools
 
