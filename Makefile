@@ -9,7 +9,7 @@ export PYGAME_HIDE_SUPPORT_PROMPT := 1
 # Python keeps what it has compiled, whatever the shell says: the tests start many processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test suite test-browser matrix quick docs site shown lint types compiled \
+.PHONY: demo test suite coverage test-browser matrix quick docs site shown lint types compiled \
 	check setup clean
 
 demo: $(STAMP)
@@ -127,6 +127,10 @@ compiled: $(STAMP)
 
 check: $(STAMP)
 	$(BIN)/pytest --numprocesses auto --dist worksteal
+
+# The same tests, with a table of the lines and branches that they reach of each room.
+coverage: compiled
+	$(BIN)/python -m tests.coverage --numprocesses auto --dist worksteal
 
 setup: $(STAMP)
 
