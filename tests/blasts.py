@@ -43,8 +43,8 @@ def consequences(
 def soon_growing_cells() -> Iterator[None]:
     """Let coarse and fine cells grow after a third of the path, to twice their largest side.
 
-    A blast takes a tenth of the time, for loads within a tenth of those of the cells that users
-    get: for tests of what is done with loads.
+    A blast takes a tenth of the time, for loads within some 15 % of those of the cells that
+    users get: for tests of what is done with loads.
     """
     fewer = {
         name: replace(growth, run=growth.run / 3.0, largest_m=2.0 * growth.largest_m)

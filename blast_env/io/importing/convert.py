@@ -112,8 +112,9 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> SiteI
     limits on time and memory; see `ReadingLimits`.
 
     Args:
-        path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`), DXF (`.dxf`) or
-            IFC (`.ifc`, extra `ifc`).
+        path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`), DXF (`.dxf`), IFC
+            (`.ifc`, extra `ifc`), GeoParquet (`.parquet`), or GeoPackage, shapefile, FlatGeobuf
+            and KML (`.gpkg`, `.shp`, `.fgb`, `.kml`, extra `gis`).
         options: Options of the import.
 
     Raises:
@@ -193,6 +194,18 @@ def _read_ifc(site_map: SiteMap) -> None:
     read_ifc(site_map)
 
 
+def _read_layers(site_map: SiteMap) -> None:
+    from blast_env.io.importing.layers import read_layers  # here: it needs the extra `gis`
+
+    read_layers(site_map)
+
+
+def _read_geoparquet(site_map: SiteMap) -> None:
+    from blast_env.io.importing.geoparquet import read_geoparquet  # pyarrow takes long to import
+
+    read_geoparquet(site_map)
+
+
 _READERS: Final[Mapping[str, Callable[[SiteMap], None]]] = MappingProxyType(
     {
         ".geojson": read_geojson,
@@ -200,6 +213,8 @@ _READERS: Final[Mapping[str, Callable[[SiteMap], None]]] = MappingProxyType(
         ".dxf": read_dxf,
         ".ifc": _read_ifc,
         **dict.fromkeys(OSM_SUFFIXES, read_osm),
+        **dict.fromkeys((".gpkg", ".shp", ".fgb", ".kml"), _read_layers),
+        **dict.fromkeys((".parquet", ".geoparquet"), _read_geoparquet),
     }
 )
 

@@ -17,11 +17,10 @@ _TRACE: Final = "it has no outlines: trace the buildings, for example in QGIS, a
 
 _WAYS: Final[Mapping[str, str]] = MappingProxyType(
     {
-        **dict.fromkeys((".shp", ".gpkg", ".gml", ".kml", ".kmz", ".fgb", ".gpx"), _BY_GDAL),
-        **dict.fromkeys((".tab", ".mif", ".parquet", ".geoparquet", ".sqlite", ".gdb"), _BY_GDAL),
+        **dict.fromkeys((".gml", ".kmz", ".gpx", ".tab", ".mif", ".sqlite", ".gdb"), _BY_GDAL),
         **dict.fromkeys((".geojsonl", ".geojsons", ".geojsonseq", ".ndjson"), _BY_GDAL),
         **dict.fromkeys((".topojson", ".esrijson"), _BY_GDAL),
-        **dict.fromkeys((".shx", ".dbf", ".prj"), "name the file .shp beside it to ogr2ogr"),
+        **dict.fromkeys((".shx", ".dbf", ".prj"), "name the file .shp beside it"),
         **dict.fromkeys((".dwg", ".dwf", ".dgn"), _AS_DXF),
         **dict.fromkeys((".rvt", ".pln", ".skp", ".3dm", ".nwd", ".nwc", ".ifcxml"), _AS_MODEL),
         **dict.fromkeys((".obj", ".stl", ".ply", ".glb", ".gltf", ".fbx", ".dae"), _AS_MODEL),

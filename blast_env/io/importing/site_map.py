@@ -161,6 +161,27 @@ def _one_fate_each(entries: Iterable[LedgerEntry], used: set[str]) -> Iterator[L
             yield replace(entry, fate=Fate.CUT)
 
 
+def code_of(path: Path, system: str) -> str:
+    """Return a reference system by the code of its authority, such as EPSG:25832.
+
+    Args:
+        path: The file.
+        system: As pyproj reads it: a code, WKT or PROJJSON.
+
+    Raises:
+        BlastEnvError: If pyproj cannot read it, or it has no code.
+    """
+    from pyproj import CRS  # takes a tenth of a second to import
+
+    with errors_of("pyproj", path, "a map with a reference system"):
+        authority = CRS.from_user_input(system).to_authority()
+    if authority is None:
+        raise BlastEnvError(
+            f"{path}: its reference system has no code of an authority: say --crs ({system[:60]})"
+        )
+    return ":".join(authority)
+
+
 def check_count(path: Path, count: int, most: int, what: str) -> None:
     """Refuse a file that has too many of something.
 

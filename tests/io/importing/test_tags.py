@@ -632,10 +632,10 @@ def test_a_street_below_a_raised_building_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("a.shp", "convert it: ogr2ogr -f GeoJSON map.geojson a.shp"),
-        ("my town.gpkg", "convert it: ogr2ogr -f GeoJSON map.geojson 'my town.gpkg'"),
-        ("a.KML", "ogr2ogr -f GeoJSON"),
-        ("a.parquet", "ogr2ogr -f GeoJSON"),
+        ("a.gml", "convert it: ogr2ogr -f GeoJSON map.geojson a.gml"),
+        ("my town.tab", "convert it: ogr2ogr -f GeoJSON map.geojson 'my town.tab'"),
+        ("a.KMZ", "ogr2ogr -f GeoJSON"),
+        ("a.sqlite", "ogr2ogr -f GeoJSON"),
         ("a.geojsonl", "ogr2ogr -f GeoJSON"),
         ("a.dwg", "save it as DXF"),
         ("a.rvt", "export it as IFC"),

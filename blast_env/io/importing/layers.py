@@ -1,0 +1,106 @@
+"""Reading of layers of GeoPackage, shapefile, FlatGeobuf and KML by pyogrio, which has GDAL."""
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.io.importing.geojson import LOCAL
+from blast_env.io.importing.properties import tags_of
+from blast_env.io.importing.site_map import (
+    MOST_FEATURES,
+    MapFeature,
+    SiteMap,
+    check_count,
+    code_of,
+    errors_of,
+)
+
+_TAG_NAMES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        **dict.fromkeys(("building:l", "building_l"), "building:levels"),
+        **dict.fromkeys(("roof:heigh", "roof_heigh"), "roof:height"),
+        **dict.fromkeys(("roof:level", "roof_level"), "roof:levels"),
+        "Name": "name",
+    }
+)
+"""Tags by other names: a shapefile cuts names after ten letters, KML has a capital."""
+
+
+def read_layers(site_map: SiteMap) -> None:
+    """Read all layers of a file into a map.
+
+    Its coordinates are in the reference system of the options, `local` for metres without a place
+    on the Earth; that of the layers unless given.
+
+    Raises:
+        BlastEnvError: If it cannot be read, its layers have several reference systems or none, or
+            pyogrio is not installed.
+    """
+    site_map.options.refuse("geographic data, whose coordinates --crs is about", "units")
+    path, systems = site_map.path, dict[str, str | None]()
+    with import_extra("gis", "geographic data"):
+        import pyogrio
+    with errors_of("pyogrio", path, "geographic data"):
+        names = [str(name) for name, *_ in pyogrio.list_layers(path)]
+    for name in names:
+        with errors_of("pyogrio", path, "geographic data"):
+            count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
+            check_count(path, count, MOST_FEATURES, "outlines and lines")
+            meta, _, geometries, columns = pyogrio.raw.read(path, layer=name, force_2d=True)
+        if geometries is None:
+            continue  # a table without places
+        systems[name] = meta["crs"]
+        for feature in _features(name if len(names) > 1 else "", meta, geometries, columns):
+            site_map.add(feature)
+    crs = _system(site_map, systems) if site_map.options.crs is None else site_map.options.crs
+    site_map.crs = None if crs == LOCAL else crs
+
+
+def _features(
+    layer: str, meta: Mapping[str, Any], geometries: Any, columns: Any
+) -> Iterator[MapFeature]:
+    """Yield the features of a layer; one without a geometry is lost."""
+    fields = [_TAG_NAMES.get(str(name), str(name)) for name in meta["fields"]]
+    for number, (given, *values) in enumerate(zip(geometries, *columns, strict=True)):
+        place = f"{layer or 'features'}[{number}]"
+        properties = {
+            name: plain
+            for name, value in zip(fields, values, strict=True)
+            if (plain := _plain(value)) is not None
+        }
+        tags = tags_of({"properties": properties})
+        if given is None or (geometry := shapely.from_wkb(given)).is_empty:
+            yield MapFeature(shapely.Point(), tags, place, "features without a geometry")
+        else:
+            yield MapFeature(geometry, tags, place)
+
+
+def _plain(value: Any) -> str | int | float | bool | None:
+    """Return a value of a column as a tag has it; `None` for what is missing, and for dates."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and np.isnan(value):
+        return None
+    return value if isinstance(value, str | int | float | bool) else None
+
+
+def _system(site_map: SiteMap, systems: Mapping[str, str | None]) -> str:
+    """Return the reference system of all layers."""
+    known = {system for system in systems.values() if system is not None}
+    if len(known) > 1:
+        listed = ", ".join(f"{name}: {(system or 'none')[:60]}" for name, system in systems.items())
+        raise BlastEnvError(
+            f"{site_map.path}: its layers have {len(known)} reference systems, must have one: "
+            f"{listed}"
+        )
+    if not known or None in systems.values():
+        beside = "; that of a shapefile is in the .prj beside it"
+        raise BlastEnvError(
+            f"{site_map.path}: has no reference system: say --crs, local for plain metres"
+            f"{beside if site_map.path.suffix.lower() == '.shp' else ''}"
+        )
+    return code_of(site_map.path, known.pop())

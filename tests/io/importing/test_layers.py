@@ -1,0 +1,168 @@
+"""GeoPackage, shapefile, FlatGeobuf, KML and GeoParquet: the site of the same map in GeoJSON."""
+
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pyogrio
+import pytest
+import shapely
+from shapely.geometry import shape
+
+from blast_env.errors import BlastEnvError
+from blast_env.io.importing import ImportOptions, SiteImport, import_site
+
+MARKET = Path("docs/data/market_street.geojson")
+OPTIONS = ImportOptions(protect=("Town Hall",))
+
+
+@cache
+def features() -> tuple[dict[str, Any], ...]:
+    return tuple(json.loads(MARKET.read_text(encoding="utf-8"))["features"])
+
+
+def is_outline(feature: dict[str, Any]) -> bool:
+    return bool(feature["geometry"]["type"] == "Polygon")
+
+
+def write(
+    path: Path,
+    chosen: Sequence[dict[str, Any]],
+    layer: str = "map",
+    crs: str | None = "EPSG:4326",
+    append: bool = False,
+) -> Path:
+    """Write features of one kind of geometry by GDAL."""
+    names = sorted({name for feature in chosen for name in feature["properties"]})
+    columns = [
+        np.array([feature["properties"].get(name) for feature in chosen], dtype=object)
+        for name in names
+    ]
+    columns = [
+        np.array([None if value is None else str(value) for value in column], dtype=object)
+        for column in columns
+    ]
+    geometries = [shapely.to_wkb(shape(feature["geometry"])) for feature in chosen]
+    pyogrio.raw.write(
+        path,
+        np.array(geometries, dtype=object),
+        columns,
+        names,
+        layer=layer,
+        driver="KML" if path.suffix == ".kml" else None,
+        geometry_type=chosen[0]["geometry"]["type"],
+        crs=crs,
+        append=append,
+    )
+    return path
+
+
+def as_geojson(path: Path, chosen: Sequence[dict[str, Any]]) -> Path:
+    document = {"type": "FeatureCollection", "features": [*chosen]}
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def sizes(found: SiteImport) -> list[tuple[float, float]]:
+    """Return area and height of each building."""
+    return [
+        (round(sum(part.polygon.area for part in building.polygons), 6), building.wall_height_m)
+        for building in found.buildings
+    ]
+
+
+def test_a_geopackage_of_two_layers_is_the_map(tmp_path: Path) -> None:
+    outlines = [feature for feature in features() if is_outline(feature)]
+    others = [feature for feature in features() if not is_outline(feature)]
+    path = write(tmp_path / "market_street.gpkg", outlines, "buildings")
+    write(path, others, "roads", append=True)
+    found = import_site(path, OPTIONS)
+    assert found.scenario.content_hash == import_site(MARKET, OPTIONS).scenario.content_hash
+    places = {building.place for building in found.buildings}
+    assert all(place.startswith("buildings[") for place in places)
+
+
+@pytest.mark.filterwarnings("ignore:Normalized/laundered field name")  # of ten letters
+@pytest.mark.parametrize("suffix", [".shp", ".fgb", ".kml"])
+def test_outlines_of_other_formats_have_the_same_areas_and_heights(
+    suffix: str, tmp_path: Path
+) -> None:
+    outlines = [feature for feature in features() if is_outline(feature)]
+    x, y = np.mean([shape(feature["geometry"]).bounds[:2] for feature in outlines], axis=0)
+    options = ImportOptions(protect=("Town Hall",), charge_at=((float(x), float(y)),))
+    plain = import_site(as_geojson(tmp_path / "plain.geojson", outlines), options)
+    found = import_site(write(tmp_path / f"map{suffix}", outlines), options)
+    assert sizes(found) == sizes(plain)
+
+
+@pytest.mark.parametrize("crs", ["unsaid", "EPSG:4326"])
+def test_geoparquet_is_the_map(crs: str, tmp_path: Path) -> None:
+    rows: list[dict[str, Any]] = [
+        {
+            "tags": {name: str(value) for name, value in feature["properties"].items()},
+            "bbox": {"xmin": 0.0, "ymin": 0.0, "xmax": 1.0, "ymax": 1.0},
+            "geometry": shapely.to_wkb(shape(feature["geometry"])),
+        }
+        for feature in features()
+    ]
+    column = {"encoding": "WKB", "geometry_types": []}
+    if crs != "unsaid":
+        column["crs"] = pyproj_json(crs)
+    geo = {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}}
+    kinds = pa.schema(
+        {
+            "tags": pa.map_(pa.string(), pa.string()),
+            "bbox": pa.struct({side: pa.float64() for side in ("xmin", "ymin", "xmax", "ymax")}),
+            "geometry": pa.binary(),
+        },
+        metadata={"geo": json.dumps(geo)},
+    )
+    table = pa.Table.from_pylist(
+        [{**row, "tags": [*row["tags"].items()]} for row in rows], schema=kinds
+    )
+    path = tmp_path / "market_street.parquet"
+    pq.write_table(table, path)
+    found = import_site(path, OPTIONS)
+    assert found.scenario.content_hash == import_site(MARKET, OPTIONS).scenario.content_hash
+
+
+def pyproj_json(crs: str) -> Any:
+    from pyproj import CRS
+
+    return CRS(crs).to_json_dict()
+
+
+def test_layers_without_a_reference_system_are_refused(tmp_path: Path) -> None:
+    outlines = [feature for feature in features() if is_outline(feature)]
+    with pytest.warns(UserWarning, match="'crs' was not provided"):
+        path = write(tmp_path / "plain.fgb", outlines, crs=None)
+    with pytest.raises(BlastEnvError, match="no reference system: say --crs"):
+        import_site(path, OPTIONS)
+
+
+def test_layers_of_two_reference_systems_are_refused(tmp_path: Path) -> None:
+    outlines = [feature for feature in features() if is_outline(feature)]
+    path = write(tmp_path / "two.gpkg", outlines, "here")
+    write(path, outlines, "there", crs="EPSG:25832", append=True)
+    with pytest.raises(BlastEnvError, match="2 reference systems, must have one: here: EPSG:4326"):
+        import_site(path, OPTIONS)
+
+
+def test_parquet_without_geometries_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table({"a": [1]}), path)
+    with pytest.raises(BlastEnvError, match="Parquet without geometries: its metadata has no"):
+        import_site(path)
+
+
+@pytest.mark.parametrize("suffix", [".gpkg", ".shp", ".fgb", ".kml", ".parquet"])
+def test_what_is_no_such_file_is_a_plain_error(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"broken{suffix}"
+    path.write_bytes(b"this is no map")
+    with pytest.raises(BlastEnvError, match="cannot be read as"):
+        import_site(path)
