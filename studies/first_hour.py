@@ -24,7 +24,6 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import mean_estimate
-from blast_env.surrogate.engine import engine_to_train_on
 
 HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
@@ -67,8 +66,8 @@ class Setting:
 
     @cached_property
     def training(self) -> Engine:
-        """The engine of the training; the surrogate's guesses are at their safe end."""
-        return engine_to_train_on(self.engine)
+        """The engine of the training, as `gymnasium.make(engine=...)` has it."""
+        return find_engine(self.engine)
 
 
 def trained(algorithm: str, setting: Setting, steps: int, seed: int) -> Agent:

@@ -127,7 +127,11 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/researchers/training.md
     "python -m studies.cluster --engine surrogate": "--budget 8 --workers 1",
-    "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
+    "python -m studies.first_hour --reward relative": (
+        "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0"
+    ),
+    "python -m studies.first_hour --scenario control_room --engine surrogate --action dimensions"
+    " --seeds 1 --threats 24 --by-gas 6": "--steps 64 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.gas kingery-bulmash --charges 100": "--charges 20 --distances 4.3",
