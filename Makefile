@@ -47,7 +47,7 @@ MATRIX_PYTHON = out/matrix/$*/bin/python
 ROUNDING := default avx2 avx512 generic kernels no-fma one-thread four-threads
 ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents design gas response studies test_gas.py)
 # The doors to agents, each with the extra that it needs; they cannot be installed together. Their
-# extras pin them, and not constraints.txt, whose versions OpenEnv's packages do not all take.
+# extras bound them, and not constraints.txt, whose versions OpenEnv's packages do not all take.
 DOORS := mcp openenv
 matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%) $(DOORS:%=matrix-%)
 

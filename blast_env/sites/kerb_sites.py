@@ -82,6 +82,7 @@ class KerbSiteRanges(Ranges):
         pieces: Pieces of an item in stock.
         price_of_height: Exponent p in the cost of a piece, length times height to the power p.
         budget_share: Budget, as a share of the cost of a wall of 2 m along the whole front.
+        air_above_m: Air above the tallest building, m.
     """
 
     across_m: Side
