@@ -27,7 +27,7 @@ _PLACE: Final = (
 
 def import_map(
     context: typer.Context,
-    file: Path = typer.Argument(help=".geojson, .osm, .osm.pbf, .dxf or .ifc."),
+    file: Path = typer.Argument(help=".geojson, .city.json, .osm, .osm.pbf, .dxf, .ifc, ..."),
     out: Path = writes("Scenario file to write", ".toml", default=...),
     picture: Path | None = writes("Write a plan, outlines over modules", *PICTURES),
     ledger: Path | None = writes(
@@ -124,7 +124,7 @@ def import_map(
         False, "--strict", help="Refuse a file where anything was guessed or left out."
     ),
 ) -> None:
-    """Make a scenario from a map, drawing or model: GeoJSON, OpenStreetMap, DXF, IFC.
+    """Make a scenario from a map, drawing or model: GeoJSON, CityJSON, OpenStreetMap, DXF, IFC.
 
     The site is turned to the direction of most walls, and buildings are polygons; the table gives
     the deviation of the modules of each building from its outline.

@@ -16,7 +16,9 @@ from blast_env.io.importing.site_map import WGS84, SiteMap
 from blast_env.io.importing.things import Role, Thing, things_of
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
-SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf", ".ifc")
+SUFFIXES: Final = (
+    *(".geojson", ".json", ".city.jsonl", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf", ".ifc"),
+)
 
 _LIMITS: Final = ReadingLimits(processor_s=60, memory_bytes=1_000_000_000, wall_s=300.0)
 _DEGREE_M: Final = 111_000.0

@@ -68,6 +68,16 @@ class Faces:
         return cls(plans, low_m, np.array([face_m[:, 2].max() for face_m in corners_m]))
 
     @classmethod
+    def of_rings(cls, rings_m: Sequence[Sequence[FloatArray]]) -> "Faces":
+        """Return the faces with these outer borders and holes, each (k, 3), k at least 3."""
+        faces = cls.of([outer_m for outer_m, *_ in rings_m])
+        for number, (_, *holes_m) in enumerate(rings_m):
+            if holes_m and shapely.get_dimensions(faces.plans[number]) == 2:
+                holes = shapely.union_all([_plan(hole_m[:, :2]) for hole_m in holes_m])
+                faces.plans[number] = _without(faces.plans[number], holes)
+        return faces
+
+    @classmethod
     def of_triangles(cls, corners_m: FloatArray) -> "Faces":
         """Return the faces with these corners, (n, 3, 3)."""
         plans = np.asarray(shapely.polygons(corners_m[:, :, :2]), dtype=object)

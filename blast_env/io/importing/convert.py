@@ -18,8 +18,8 @@ from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
 from blast_env.io.importing.fitting import MOST_TITLE, BuildingFit, fit_buildings, plain_name
 from blast_env.io.importing.formats import way_of
-from blast_env.io.importing.geojson import read_geojson
 from blast_env.io.importing.ground import build_zone, charge_sources
+from blast_env.io.importing.json_maps import read_json, read_json_lines
 from blast_env.io.importing.ledger import CHANGES, MOST_LETTERS, Fate, Ledger
 from blast_env.io.importing.options import ImportOptions, PlaceXY
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
@@ -47,7 +47,7 @@ _SKETCH_DETAIL: Final = 2e-4  # of the map's extent
 _MOST_DESCRIPTION: Final = 2000
 _GLASS: Final = "window_annealed_6"
 _HASH_DIGITS: Final = 12
-_PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf", ".ifc")
+_PLAIN_SUFFIXES: Final = (".geojson", ".json", ".cityjson", ".osm", ".dxf", ".ifc")
 _READ_HERE_BYTES: Final = 100_000
 """Largest unpacked file that is read in this process: starting another takes half a second."""
 
@@ -112,9 +112,10 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> SiteI
     limits on time and memory; see `ReadingLimits`.
 
     Args:
-        path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`), DXF (`.dxf`), IFC
-            (`.ifc`, extra `ifc`), GeoParquet (`.parquet`), or GeoPackage, shapefile, FlatGeobuf
-            and KML (`.gpkg`, `.shp`, `.fgb`, `.kml`, extra `gis`).
+        path: GeoJSON (`.geojson`, `.json`), CityJSON (`.city.json`, `.city.jsonl`), OpenStreetMap
+            (`.osm`, `.osm.pbf`), DXF (`.dxf`), IFC (`.ifc`, extra `ifc`), GeoParquet (`.parquet`),
+            or GeoPackage, shapefile, FlatGeobuf and KML (`.gpkg`, `.shp`, `.fgb`, `.kml`, extra
+            `gis`).
         options: Options of the import.
 
     Raises:
@@ -208,8 +209,8 @@ def _read_geoparquet(site_map: SiteMap) -> None:
 
 _READERS: Final[Mapping[str, Callable[[SiteMap], None]]] = MappingProxyType(
     {
-        ".geojson": read_geojson,
-        ".json": read_geojson,
+        **dict.fromkeys((".geojson", ".json", ".cityjson"), read_json),
+        **dict.fromkeys((".city.jsonl", ".cityjsonl"), read_json_lines),
         ".dxf": read_dxf,
         ".ifc": _read_ifc,
         **dict.fromkeys(OSM_SUFFIXES, read_osm),

@@ -24,7 +24,7 @@ _WAYS: Final[Mapping[str, str]] = MappingProxyType(
         **dict.fromkeys((".dwg", ".dwf", ".dgn"), _AS_DXF),
         **dict.fromkeys((".rvt", ".pln", ".skp", ".3dm", ".nwd", ".nwc", ".ifcxml"), _AS_MODEL),
         **dict.fromkeys((".obj", ".stl", ".ply", ".glb", ".gltf", ".fbx", ".dae"), _AS_MODEL),
-        **dict.fromkeys((".step", ".stp", ".blend", ".cityjson"), _AS_MODEL),
+        **dict.fromkeys((".step", ".stp", ".blend"), _AS_MODEL),
         **dict.fromkeys((".o5m", ".osc", ".osh"), _AS_OSM),
         **dict.fromkeys((".zip", ".ifczip", ".7z", ".tar", ".tgz", ".gz", ".bz2", ".xz"), _UNPACK),
         **dict.fromkeys((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".pdf", ".svg"), _TRACE),
@@ -47,8 +47,6 @@ def way_of_json(document: Mapping[str, Any], name: str) -> str:
     by_gdal = _BY_GDAL.format(name=_word(name))
     if document.get("type") == "Topology":
         return f"it is TopoJSON; {by_gdal}"
-    if document.get("type") == "CityJSON":
-        return f"it is CityJSON; {_AS_MODEL}"
     if isinstance(document.get("elements"), list):
         return f"it is JSON of Overpass; {_OVERPASS}"
     if "geometryType" in document or "spatialReference" in document:

@@ -1,6 +1,5 @@
 """Reading of GeoJSON, RFC 7946 or the older form with a `crs` member."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -9,19 +8,15 @@ import shapely
 from shapely.geometry import shape
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.errors import BlastEnvError, reason_of, value_text
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.io.importing.formats import way_of_json
 from blast_env.io.importing.properties import tags_of
 from blast_env.io.importing.site_map import (
     WGS84,
     MapFeature,
     SiteMap,
-    check_count,
     errors_of,
 )
-
-MOST_VALUES: Final = 3_000_000
-"""Most numbers, arrays and tables of a file: each takes some hundred bytes in memory."""
 
 LOCAL: Final = "local"
 """Reference system of coordinates in metres without a place on the Earth."""
@@ -33,41 +28,24 @@ _KINDS: Final = (
 )
 
 
-def read_geojson(site_map: SiteMap) -> None:
-    """Read a GeoJSON file into a map.
+def read_geojson(site_map: SiteMap, document: Mapping[str, Any]) -> None:
+    """Read a GeoJSON document into a map.
 
     Its coordinates are in the reference system of the options, `local` for metres without a place
     on the Earth; that of the file unless given, or longitude and latitude (EPSG:4326) if it has
     none.
 
     Raises:
-        BlastEnvError: If it cannot be read, or is not GeoJSON.
+        BlastEnvError: If it is not GeoJSON.
     """
     path, options = site_map.path, site_map.options
     options.refuse("GeoJSON, whose coordinates --crs is about", "units")
-    document = _parsed(path, site_map.content)
     listed = _listed_features(path, document)
     for index in range(len(listed)):
         item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
         site_map.add(_feature(path, f"features[{index}]", item))
     crs = _crs(path, document) if options.crs is None else options.crs
     site_map.crs = None if crs == LOCAL else crs
-
-
-def _parsed(path: Path, content: bytes) -> Mapping[str, Any]:
-    values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
-    check_count(path, values, MOST_VALUES, "commas and opening brackets")
-    try:
-        document = json.loads(content)
-    except RecursionError as error:
-        raise BlastEnvError(f"{path}: is nested too deeply") from error
-    except ValueError as error:
-        lines = "; if it has a feature in each line, convert it with ogr2ogr -f GeoJSON"
-        hint = lines if str(error).startswith("Extra data") else ""
-        raise BlastEnvError(f"{path}: is not JSON: {reason_of(error)}{hint}") from error
-    if not isinstance(document, dict):
-        raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
-    return document
 
 
 def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:

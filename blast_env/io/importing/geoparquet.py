@@ -9,10 +9,11 @@ import pyarrow.parquet as pq
 import shapely
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.io.importing.geojson import LOCAL, MOST_VALUES
+from blast_env.io.importing.geojson import LOCAL
 from blast_env.io.importing.properties import tags_of
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
+    MOST_VALUES,
     WGS84,
     MapFeature,
     SiteMap,

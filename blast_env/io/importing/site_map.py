@@ -24,6 +24,9 @@ MOST_FEATURES: Final = 100_000
 MOST_POINTS: Final = 500_000
 """Most points of all outlines and lines."""
 
+MOST_VALUES: Final = 3_000_000
+"""Most numbers, arrays and tables of a file: each takes some hundred bytes in memory."""
+
 MOST_COORDINATE: Final = 1e12
 """Largest coordinate in any unit; in millimetres the Earth's circumference is 4e10."""
 
@@ -51,6 +54,9 @@ class MapFeature:
         extent_m: Its lowest and highest z, m, in a drawing or model; `None` if tags say its
             heights.
         part_of: Place in the file of the building of which it is a part, or an empty string.
+        ground_m: Height of the ground under it, in the same coordinate; `None` if the file does not
+            state it.
+        is_levelled: Whether that coordinate counts from the sea or the like: its zero is no ground.
     """
 
     geometry: BaseGeometry
@@ -60,6 +66,8 @@ class MapFeature:
     facade: Mapping[str, float] = field(default_factory=dict)
     extent_m: tuple[float, float] | None = None
     part_of: str = ""
+    ground_m: float | None = None
+    is_levelled: bool = False
 
 
 @dataclass

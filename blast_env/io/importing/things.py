@@ -54,6 +54,8 @@ class Thing:
         is_part: Whether it is a part of a building with a height of its own.
         facade: Its storeys and windows, see `MapFeature`.
         has_z: Whether its heights are coordinates of a drawing or model, from the file's zero.
+        is_levelled: Whether that zero is no ground, but the sea or the like.
+        ground_m: Height of the ground under it in those coordinates, m, if the source states it.
         fault: Why it cannot be used; an empty string if it can.
     """
 
@@ -73,6 +75,8 @@ class Thing:
     is_part: bool = False
     facade: Mapping[str, float] = field(default_factory=dict)
     has_z: bool = False
+    is_levelled: bool = False
+    ground_m: float | None = None
     fault: str = ""
 
     @property
@@ -162,6 +166,9 @@ _WALLS: Final = frozenset(
 )
 """Values of OpenStreetMap's `barrier` of solid obstacles, which an import does not make."""
 
+_CONSTRUCTIONS: Final = ("Bridge", "BridgePart", "OtherConstruction")
+"""Types of CityJSON of other constructions than buildings."""
+
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
 _YES: Final = ("yes", "true", "1")
 _NO: Final = ("no", "false", "none", "0", "")
@@ -224,16 +231,26 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
         if role is not None:
             whole = wholes.get(str(feature.tags.get("building_id", "")), "")
             found.append(_thing(feature, role, reader, whole))
-        elif str(feature.tags.get("barrier", "")).lower() in _WALLS:
-            fault = "walls of the map, which shield"
+        elif fault := _shields(feature.tags):
             found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
         else:
             chief = next((key for key in (*_CHIEF_KEYS, *feature.tags) if key in feature.tags), "")
             kind = named(chief) if chief else "no tag"
             if site_map.has_layers:
                 kind = f"layer {named(str(feature.tags['layer']))}"
+            elif "cityjson" in feature.tags:
+                kind = named(str(feature.tags["cityjson"]))
             site_map.ledger.add(Fate.PASSED, f"without a role: {kind}", feature.place)
     return tuple(found)
+
+
+def _shields(tags: Tags) -> str:
+    """Return what an object is that shields, but that an import does not make; else nothing."""
+    if _word(tags, "barrier") in _WALLS:
+        return "walls of the map, which shield"
+    if tags.get("cityjson") in _CONSTRUCTIONS:
+        return "constructions that are no buildings, which shield"
+    return ""
 
 
 def _selectors(site_map: SiteMap) -> dict[Role, tuple[Selector, ...]]:
@@ -348,6 +365,8 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         width_m=_width_m(feature, reader) if role is Role.CHARGE else None,
         facade=feature.facade,
         has_z=feature.extent_m is not None,
+        is_levelled=feature.is_levelled,
+        ground_m=feature.ground_m,
         is_part=_is_part(tags),
         fault=_fault(feature, role, has_layers),
     )

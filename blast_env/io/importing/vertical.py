@@ -37,6 +37,7 @@ _ON_POSTS: Final = ("roof", "canopy", "carport", "bridge")
 def on_the_ground(things: Sequence[Thing], level_m: float, ledger: Ledger) -> list[Thing]:
     """Return buildings with their heights relative to the ground under them.
 
+    0. Where the file states the ground under a building, it is there.
     1. A building stands on those below it. One that stands on no other is on the ground.
     2. In a file with buildings near its zero that zero is the ground, and a building within a
        storey of it is raised by as much.
@@ -98,12 +99,13 @@ class _Places:
 
     def _ground(self, k: int, lower: Mapping[int, tuple[float, str]]) -> tuple[float, str]:
         """Return the same of one building, from those of the buildings with lower undersides."""
-        below = self._below[k]
+        thing, below = self._things[k], self._below[k]
+        if thing.ground_m is not None:
+            return thing.ground_m, ""
         if below is not None:
             ground_m, kind = lower[below]
             return ground_m, kind if kind == _GROUND else ""
         # It stands on no other. 1. Near the zero of its file: on the ground.
-        thing = self._things[k]
         base_m, height_m = thing.base_m, self._top_m(thing)
         if self._is_near_zero(thing) if thing.has_z else base_m <= self._level_m:
             return 0.0, ""
@@ -128,7 +130,12 @@ class _Places:
         return thing.base_m + self._level_m if thing.height_m is None else thing.height_m
 
     def _is_near_zero(self, thing: Thing) -> bool:
-        """Return whether a building begins within a storey of the zero of its file, or across."""
+        """Return whether a building begins within a storey of the zero of its file, or across.
+
+        The zero of a height above the sea is none of these.
+        """
+        if thing.is_levelled:
+            return False
         return abs(thing.base_m) <= self._level_m or thing.base_m < 0.0 < (thing.height_m or 0.0)
 
     def _support(self, k: int) -> int | None:

@@ -47,7 +47,9 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 def test_folder_and_unknown_suffix_are_named(tmp_path: Path) -> None:
     (tmp_path / "a.geojson").mkdir()
     assert error_of(tmp_path / "a.geojson").endswith("is a folder, must be a file")
-    assert "suffix is '.gml', must be one of .geojson, .json, .dxf" in error_of(tmp_path / "a.gml")
+    assert "suffix is '.gml', must be one of .geojson, .json, .cityjson" in error_of(
+        tmp_path / "a.gml"
+    )
 
 
 def test_large_files_are_refused_before_they_are_read(

@@ -646,7 +646,7 @@ def test_a_street_below_a_raised_building_is_named(tmp_path: Path) -> None:
 )
 def test_formats_that_are_not_read_name_the_way(name: str, words: str, tmp_path: Path) -> None:
     message = refusal(tmp_path / name)
-    assert "must be one of .geojson, .json, .dxf" in message
+    assert "must be one of .geojson, .json, .cityjson" in message
     assert words in message
 
 
@@ -654,7 +654,6 @@ def test_formats_that_are_not_read_name_the_way(name: str, words: str, tmp_path:
     ("text", "words"),
     [
         ('{"type": "Topology", "objects": {}}', "it is TopoJSON; convert it: ogr2ogr -f GeoJSON"),
-        ('{"type": "CityJSON"}', "it is CityJSON; export it as IFC"),
         ('{"version": 0.6, "elements": []}', "it is JSON of Overpass; ask Overpass for [out:xml]"),
         ('{"geometryType": "esriGeometryPolygon", "features": []}', "it is JSON of ArcGIS"),
         ('{"type": "Feature"}\n{"type": "Feature"}', "convert it with ogr2ogr -f GeoJSON"),
