@@ -24,7 +24,7 @@ from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.strategies import ReductionReward, Transition
+from blast_env.envs.strategies import Transition
 from blast_env.evaluation import (
     Assessment,
     Evaluation,
@@ -122,9 +122,9 @@ class RewardCorrection:
         self, transition: Transition, loads: Mapping[Layout, Assessment]
     ) -> Mapping[str, float]:
         """Return the term `reduction`, 0 before the end."""
-        guessed = ReductionReward()(transition, loads)["reduction"]
         if not transition.ended:
             return {"reduction": 0.0}
+        guessed = float(np.nan_to_num(loads[transition.after].reduction_from(loads[()])))
         return {"reduction": self.corrected(transition.after, guessed)}
 
     def corrected(self, layout: Layout, guessed: float) -> float:

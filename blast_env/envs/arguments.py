@@ -63,17 +63,24 @@ def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> Non
             raise UnknownNameError(kind, name, known)
 
 
-def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) -> _Strategy:
+def strategy(
+    kind: str,
+    value: str | _Strategy,
+    known: Mapping[str, _Strategy],
+    protocols: tuple[type, ...] = (),
+) -> _Strategy:
     """Return the strategy of a name, or the strategy itself.
 
     Args:
         kind: Kind of strategy, for the error.
         value: The name, or an object that is used unchanged.
         known: The named strategies.
+        protocols: Protocols of the strategies where they have several, to be checked at run time.
 
     Raises:
         UnknownNameError: If there is none of that name; the message has the nearest one.
-        BlastEnvError: If an object lacks the methods that the known ones have in common.
+        BlastEnvError: If an object lacks the methods that the known ones have in common, or is of
+            none of the protocols.
     """
     if isinstance(value, str):
         check_names(kind, [value], known)
@@ -84,6 +91,9 @@ def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) 
         raise BlastEnvError(
             f"{kind} is {value!r}, must be one of {names}, or have the method {missing[0]}"
         )
+    if protocols and not isinstance(value, protocols):
+        names = " or ".join(f"`{protocol.__name__}`" for protocol in protocols)
+        raise BlastEnvError(f"{kind} is {value!r}, must have all methods of {names}")
     return value
 
 

@@ -31,6 +31,7 @@ from blast_env.envs.observable import MASK, Observable, Observation, one_of
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import (
     REWARDS,
+    EndReward,
     Reward,
     ScenarioSource,
     ThreatModel,
@@ -126,7 +127,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     def __init__(
         self,
         scenario: AnyScenario | ScenarioSource = "courtyard",
-        reward: str | Reward = "terminal",
+        reward: str | Reward | EndReward = "terminal",
         observation: str | Observation = "image",
         action: str | Actions = "place",
         threat: str | ThreatModel = "visible",
@@ -147,7 +148,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         Args:
             scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data; or
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
-            reward: `"terminal"`, `"incremental"`, or a `Reward`.
+            reward: `"terminal"`, `"incremental"`, `"relative"`, or a `Reward` or `EndReward`.
             observation: `"image"`, `"grid"`, `"features"`, `"dict"`, or an `Observation`.
             action: `"place"`, `"dimensions"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or
                 `Actions`.
@@ -190,7 +191,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             risk=find_risk(risk, cvar_level),
             observation=strategy("observation", observation, OBSERVATIONS),
             actions=strategy("action", action, ACTIONS),
-            reward=strategy("reward", reward, REWARDS),
+            reward=strategy("reward", reward, REWARDS, (Reward, EndReward)),
             illegal=IllegalActions(
                 invalid_action == "nearest",
                 real_number("invalid_action_cost", invalid_action_cost, 0.0, 1e6),

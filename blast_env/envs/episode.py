@@ -4,7 +4,6 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import fsum
 from typing import Any, Final
 
 import numpy as np
@@ -23,8 +22,8 @@ from blast_env.envs.observable import (
     Observation,
 )
 from blast_env.envs.strategies import (
+    EndReward,
     HiddenThreat,
-    OccasionalReward,
     Reward,
     ScenarioSource,
     ThreatModel,
@@ -50,9 +49,6 @@ from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
-
-Terms = Mapping[str, float]
-"""The terms of a reward by their names."""
 
 ILLEGAL_TERM: Final = "invalid_actions"
 """The name of the reward term for illegal actions."""
@@ -111,7 +107,7 @@ class Task:
     risk: Risk | None
     observation: Observation
     actions: Actions
-    reward: Reward
+    reward: Reward | EndReward
     illegal: IllegalActions
     engine: Engine
     store: BlastStore
@@ -164,7 +160,6 @@ class _Site:
         empty: The site without a barrier.
         rules: The rules of placing on it.
         actions: The numbered actions.
-        terms: The terms of the reward, all 0.
         shown: What an agent is shown, by the charges.
         bare: The loads without a barrier, by the threats.
         outcomes: The information before the end, by the number of charges.
@@ -174,7 +169,6 @@ class _Site:
     empty: LayoutState
     rules: PlacementRules
     actions: ActionNumbers
-    terms: Terms
     shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
     outcomes: dict[int, Mapping[str, Any]] = field(default_factory=dict)
@@ -184,21 +178,15 @@ class _Site:
         """Return the common parts of a site.
 
         Raises:
-            BlastEnvError: If the scenario has another size than the representative one, or the
-                reward names the term that the environment adds itself.
+            BlastEnvError: If the scenario has another size than the representative one.
         """
         check_size(scenario, task.source.representative)
-        names, empty = task.reward.terms(scenario), LayoutState.empty(scenario)
-        if ILLEGAL_TERM in names:
-            raise BlastEnvError(
-                f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
-            )
+        empty = LayoutState.empty(scenario)
         return cls(
             task.evaluator(scenario),
             empty,
             PlacementRules.of(empty),
             ActionNumbers.of(task.actions, scenario),
-            dict.fromkeys((*names, ILLEGAL_TERM), 0.0),
         )
 
     def no_outcome(self, charges: int) -> Mapping[str, Any]:
@@ -240,7 +228,6 @@ class Episode:
         shown: What the agent is shown.
         seeds: Seeds of the blasts of each charge (charges, realisations).
         initial: The layout at the beginning.
-        terms: The terms of the last reward; before the first action all are 0.
         chosen: The choices so far for the next module or piece; `None` before the first.
         invalid_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
@@ -253,7 +240,6 @@ class Episode:
     shown: _Shown
     seeds: NDArray[np.int64]
     initial: Layout
-    terms: Terms
     chosen: ActionChoice | None = None
     invalid_actions: int = 0
     without_effect: int = 0
@@ -274,6 +260,12 @@ class Episode:
         """Return the loads with the final layout and without a barrier."""
         assert self.final is not None
         return self.loads[self.final], self.loads[()]
+
+    @property
+    def reduction(self) -> float:
+        """The share of the load that the final layout takes off; NaN where nothing arrives."""
+        protected, unprotected = self.assess()
+        return protected.reduction_from(unprotected)
 
     @cached_property
     def case(self) -> LoadCaseSet:
@@ -341,10 +333,6 @@ def _outcome(
     }
 
 
-def _always(begins: BoolArray, ended: BoolArray) -> BoolArray:  # noqa: ARG001
-    return np.ones(len(ended), dtype=np.bool_)
-
-
 class Episodes:
     """Episodes of one task side by side, each begun again when it has ended.
 
@@ -352,12 +340,17 @@ class Episodes:
         task: The task.
         count: Number of episodes.
 
+    Raises:
+        BlastEnvError: If the reward names the term that the environment adds itself.
+
     Attributes:
         task: The task.
         code: How agents write actions.
         layouts: The layouts, in arrays.
         running: Each episode; empty before the first `begin`.
         ended: Whether the charge of each has gone off (episodes,).
+        term_names: The names of the reward's terms.
+        terms: The terms of the last reward of each; before the first action 0 (episodes, terms).
     """
 
     def __init__(self, task: Task, count: int) -> None:
@@ -374,10 +367,17 @@ class Episodes:
         self._has_begun: BoolArray = np.zeros(count, dtype=np.bool_)
         self._before: IntArray = np.zeros(count, dtype=np.int64)  # elements before the last action
         self._repeated: IntArray = np.full(count, _NO_ACTION)  # the last one, if without effect
-        self._turns: dict[int, Transition] = {}  # the last ones of those that may pay
-        self._paid: set[int] = set()  # those whose terms may be other than 0
-        reward = task.reward
-        self._pays = reward.pays if isinstance(reward, OccasionalReward) else _always
+        self._turns: dict[int, Transition] = {}  # the last ones, for a reward that asks for them
+        self._ended_now: list[int] = []
+        reward, names = task.reward, task.reward.terms(task.source.representative)
+        if ILLEGAL_TERM in names:
+            raise BlastEnvError(
+                f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
+            )
+        self.term_names = *names, ILLEGAL_TERM
+        self.terms: FloatArray = np.zeros((count, len(self.term_names)))
+        self._at_ends = reward if isinstance(reward, EndReward) else None
+        self._of_turns = None if isinstance(reward, EndReward) else reward
 
     def begin(
         self, indices: Sequence[int], rngs: Sequence[np.random.Generator], options: ResetOptions
@@ -410,7 +410,7 @@ class Episodes:
                 start = LayoutState.of(scenario, options.layout)
                 self.layouts.begin([index], PlacementRules.of(start), start)
             shown = site.shown_of(self.task, charges)
-            begun.append(Episode(self.task, site, shown, seeds, start.checked, site.terms))
+            begun.append(Episode(self.task, site, shown, seeds, start.checked))
         for site, own in on_sites.values():
             self.layouts.begin(own, site.rules, site.empty)
         for index, episode in zip(indices, begun, strict=True):
@@ -420,6 +420,7 @@ class Episodes:
         chosen = np.array(indices)
         self.ended[chosen] = self._has_begun[chosen] = False
         self._repeated[chosen] = _NO_ACTION
+        self.terms[chosen] = 0.0
 
     def _drawn(
         self, rng: np.random.Generator, options: ResetOptions
@@ -460,12 +461,11 @@ class Episodes:
             stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
         self._repeated[chosen] = np.where(illegal, wanted, _NO_ACTION)
         self.ended[chosen] = stops | layouts.is_full[chosen]
-        self._turns = {}
-        for index in chosen[self._pays(self._begins[chosen], self.ended[chosen])].tolist():
-            self._turns[index] = self._turn(index)
-        for index in chosen[self.ended[chosen]].tolist():
-            turn = self._turns.get(index)
-            self.running[index].final = layouts.checked(index) if turn is None else turn.after
+        self._ended_now = chosen[self.ended[chosen]].tolist()
+        for index in self._ended_now:
+            self.running[index].final = layouts.checked(index)
+        if self._of_turns is not None:
+            self._turns = {index: self._turn(index) for index in indices}
 
     def _turn(self, index: int) -> Transition:
         """Return the last turn of an episode."""
@@ -517,17 +517,21 @@ class Episodes:
         Raises:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
         """
-        due: list[tuple[Episode, Layout]] = []
-        for index, turn in self._turns.items():
-            episode = self.running[index]
-            layouts = dict.fromkeys(self.task.reward.layouts(turn))
-            if turn.ended:
-                layouts |= {turn.after: None, (): None}
-            due += [
-                (episode, layout)
-                for layout in layouts
-                if layout not in episode.loads and not self._is_known(episode, layout)
-            ]
+        wanted: dict[int, dict[Layout, None]] = {}
+        if self._of_turns is not None:
+            for index, turn in self._turns.items():
+                wanted[index] = dict.fromkeys(self._of_turns.layouts(turn))
+        for index in self._ended_now:
+            final = self.running[index].final
+            assert final is not None
+            wanted.setdefault(index, {}).update({final: None, (): None})
+        due = [
+            (self.running[index], layout)
+            for index, layouts in wanted.items()
+            for layout in layouts
+            if layout not in self.running[index].loads
+            and not self._is_known(self.running[index], layout)
+        ]
         if not due:
             return
         asked = [
@@ -548,25 +552,32 @@ class Episodes:
         Raises:
             BlastEnvError: If the terms differ from those that the reward names.
         """
-        chosen, rewards = np.asarray(indices), np.zeros(len(self.running))
-        of_use = self._repeated[chosen] == _NO_ACTION
-        for index in self._paid:
-            self.running[index].terms = self.running[index].site.terms
-        self._paid = {*self._turns, *chosen[~of_use].tolist()}
-        for index in self._paid:
-            episode, turn = self.running[index], self._turns.get(index)
-            paid = episode.site.terms if turn is None else self.task.reward(turn, episode.loads)
-            has_effect = self._repeated[index] == _NO_ACTION
-            terms = {**paid, ILLEGAL_TERM: 0.0 if has_effect else -self.task.illegal.cost}
-            if [*terms] != [*episode.site.terms]:
-                found, named = (", ".join([*item][:-1]) for item in (terms, episode.site.terms))
+        chosen = np.asarray(indices)
+        has_effect = self._repeated[chosen] == _NO_ACTION
+        self.terms[chosen, :-1] = self._paid(chosen)
+        self.terms[chosen, -1] = np.where(has_effect, 0.0, -self.task.illegal.cost)
+        rewards: FloatArray = np.zeros(len(chosen))
+        for of_term in self.terms[chosen].T:  # one by one: the same sum of one row or of many
+            rewards += of_term
+        return rewards
+
+    def _paid(self, chosen: IntArray) -> FloatArray:
+        """Return the terms of the last actions, without that of illegal ones (n, terms)."""
+        if self._at_ends is not None:
+            ended, reductions = self.ended[chosen], np.zeros(len(chosen))
+            reductions[ended] = [self.running[index].reduction for index in chosen[ended].tolist()]
+            return self._at_ends.paid(self._begins[chosen], ended, reductions)
+        assert self._of_turns is not None
+        paid = np.empty((len(chosen), len(self.term_names) - 1))
+        for terms, index in zip(paid, chosen.tolist(), strict=True):
+            found = self._of_turns(self._turns[index], self.running[index].loads)
+            if (*found, ILLEGAL_TERM) != self.term_names:
                 raise BlastEnvError(
-                    f"the reward has the terms {found}, must have those that it names: {named}"
+                    f"the reward has the terms {', '.join(found)}, must have those that it names: "
+                    f"{', '.join(self.term_names[:-1])}"
                 )
-            episode.terms = terms
-            rewards[index] = fsum(terms.values())
-        found_of: FloatArray = rewards[chosen]
-        return found_of
+            terms[:] = [*found.values()]
+        return paid
 
     def observe(self, indices: Sequence[int], space: spaces.Space[Any]) -> Any:
         """Return the observations of some episodes, with a leading axis (episodes, ...).
@@ -631,7 +642,7 @@ class Episodes:
             "invalid_actions": episode.invalid_actions,
             "placed": int(self.layouts.placed[index]),
             "layout": self.layouts.table[index].copy(),
-            "reward_terms": dict(episode.terms),
+            "reward_terms": dict(zip(self.term_names, self.terms[index].tolist(), strict=True)),
             **episode.outcome,
             **episode.constants,
         }

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from blast_env.arrays import BoolArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.bundled import GENERATED
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Assessment
@@ -201,6 +202,7 @@ class Transition(NamedTuple):
     ended: bool
 
 
+@runtime_checkable
 class Reward(Protocol):
     """The reward of an action, in named terms.
 
@@ -230,11 +232,21 @@ class Reward(Protocol):
 
 
 @runtime_checkable
-class OccasionalReward(Reward, Protocol):
-    """A reward that pays in few turns; in the others all terms are 0, and nobody asks it."""
+class EndReward(Protocol):
+    """A reward that follows from the reduction by the whole layout, of many turns at once."""
 
-    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:
-        """Return in which turns it may pay (turns,); see `Transition` for the arguments."""
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return the names of the terms; `invalid_actions` is reserved for the environment."""
+
+    def paid(self, begins: BoolArray, ended: BoolArray, reductions: FloatArray) -> FloatArray:
+        """Return the terms, in the order of their names (turns, terms).
+
+        Args:
+            begins: Whether each turn is the first one of its episode (turns,).
+            ended: Whether the charge goes off in it.
+            reductions: The relative reduction of the load where it does, NaN where nothing arrives
+                without a barrier; elsewhere 0.
+        """
 
 
 UNPROTECTED: Final = "unprotected"
@@ -257,23 +269,13 @@ class TerminalReward:
         """Return `unprotected`, and `impulse`, `peak`, `load` (both) or `response`, taken off."""
         return UNPROTECTED, scenario.objective.term
 
-    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:
-        """Return the turns at the beginning and at the end."""
-        return begins | ended
+    def paid(self, begins: BoolArray, ended: BoolArray, reductions: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return -1 at the beginning, and at the end the share of the load taken off.
 
-    def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
-        """Return none: those at the end are enough."""
-        return ()
-
-    def __call__(
-        self, transition: Transition, loads: Mapping[Layout, Assessment]
-    ) -> Mapping[str, float]:
-        """Return -1 at the beginning, and at the end the share of the load taken off."""
-        taken_off = 0.0
-        if transition.ended:
-            taken_off = _taken_off(loads[transition.after], loads[()])
-        unprotected = -1.0 if transition.begins else 0.0
-        return {UNPROTECTED: unprotected, transition.objective.term: taken_off}
+        Where nothing arrives, all of it counts as taken off.
+        """
+        taken_off = np.where(np.isnan(reductions), 1.0, reductions)
+        return np.stack((np.where(begins, -1.0, 0.0), taken_off), axis=1)
 
 
 @dataclass(frozen=True)
@@ -310,7 +312,8 @@ class IncrementalReward:
 
 def _taken_off(load: Assessment, unprotected: Assessment) -> float:
     """Return the share of the load without a barrier that is missing; 1 where nothing arrives."""
-    return float(np.nan_to_num(load.reduction_from(unprotected), nan=1.0))
+    share = load.reduction_from(unprotected)
+    return 1.0 if isnan(share) else share
 
 
 def _has_changed(transition: Transition) -> bool:
@@ -330,25 +333,12 @@ class ReductionReward:
         """Return `reduction`."""
         return ("reduction",)
 
-    def pays(self, begins: BoolArray, ended: BoolArray) -> BoolArray:  # noqa: ARG002
-        """Return the turns at the end."""
-        return ended
-
-    def layouts(self, transition: Transition) -> Sequence[Layout]:  # noqa: ARG002
-        """Return none: those at the end are enough."""
-        return ()
-
-    def __call__(
-        self, transition: Transition, loads: Mapping[Layout, Assessment]
-    ) -> Mapping[str, float]:
+    def paid(self, begins: BoolArray, ended: BoolArray, reductions: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the term `reduction`, 0 before the end."""
-        if not transition.ended:
-            return {"reduction": 0.0}
-        reduction = loads[transition.after].reduction_from(loads[()])
-        return {"reduction": float(np.nan_to_num(reduction))}
+        return np.where(np.isnan(reductions), 0.0, reductions)[:, np.newaxis]
 
 
-REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
+REWARDS: Final[Mapping[str, Reward | EndReward]] = MappingProxyType(
     {
         "terminal": TerminalReward(),
         "incremental": IncrementalReward(),

@@ -254,14 +254,13 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         known = np.zeros(self.num_envs, dtype=bool)
         known[chosen] = True
         layouts, running = self.episodes.layouts, self._running
-        names = running[0].terms
         arrays: dict[str, Any] = {
             "action_mask": self.episodes.masks(self._all),
             "invalid_actions": np.array([item.invalid_actions for item in running]),
             "placed": layouts.placed.copy(),
             "layout": layouts.table.copy(),
         } | {name: value.copy() for name, value in self._noted.items()}
-        terms = {name: np.array([item.terms[name] for item in running]) for name in names}
+        terms = dict(zip(self.episodes.term_names, self.episodes.terms.T.copy(), strict=True))
         if not known.all():
             for values in (*arrays.values(), *terms.values()):
                 values[~known] = None if values.dtype == object else 0

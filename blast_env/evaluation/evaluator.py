@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from math import nan
+from operator import attrgetter
 from pathlib import Path
 from typing import Final, Self
 
@@ -412,7 +413,7 @@ class Assessment:
             combined(sums) if len(sums) == len(loads) else None,
             combined([load.protected_peak_pa for load in loads]),
             case.objective_value([load.load(counts) for load in loads], layout),
-            all(load.in_range for load in loads),
+            all(map(attrgetter("in_range"), loads)),
             min([load.level for load in loads]) if counts.kind == "response" else None,
         )
 

@@ -46,30 +46,23 @@ class _Served:
         self.site = site
         structures = site.scenario.structures
         self._zero_loads = _zero_loads(site)
-        self._place = {structure.name: number for number, structure in enumerate(structures)}
+        place = {structure.name: number for number, structure in enumerate(structures)}
+        self._places = [place[structure.name] for structure in site.protected]
         self._of_modules = np.repeat(np.arange(len(structures)), [s.modules for s in structures])
 
     def loads(self, guess: Guess) -> list[BlastLoads]:
         """Return the loads of each layout of a prediction."""
-        impulses_pa_s = guess.impulse_pa_s.tolist()
-        peaks_pa = guess.peak_pa.tolist() if guess.peak_pa is not None else None
-        places = [self._place[structure.name] for structure in self.site.protected]
-        on_structures = np.zeros((len(impulses_pa_s), len(self._zero_loads)))
-        on_structures[:, places] = guess.impulse_pa_s
+        on_structures = np.zeros((len(guess.impulse_pa_s), len(self._zero_loads)))
+        on_structures[:, self._places] = guess.impulse_pa_s
         on_modules = on_structures[:, self._of_modules]
+        impulses_pa_s = guess.impulse_pa_s.tolist()
+        nothing = [[None] * len(self._places)] * len(impulses_pa_s)
+        peaks_pa = nothing if guess.peak_pa is None else guess.peak_pa.tolist()
         responds, found = self.site.scenario.objective.is_response, []
-        for index, of_layout in enumerate(impulses_pa_s):
+        for index, predicted in enumerate(zip(impulses_pa_s, peaks_pa, strict=True)):
             loads = list(self._zero_loads)
-            for column, (place, structure) in enumerate(
-                zip(places, self.site.protected, strict=True)
-            ):
-                loads[place] = StructureLoad.on(
-                    structure,
-                    of_layout[column],
-                    None if peaks_pa is None else peaks_pa[index][column],
-                    notes=_NOTES,
-                    validation=_GUESSED,
-                )
+            for place, impulse_pa_s, peak_pa in zip(self._places, *predicted, strict=True):
+                loads[place] = loads[place].with_load(impulse_pa_s, peak_pa)
             bays = guess.bays(self.site, index) if responds else ()
             found.append(BlastLoads(tuple(loads), on_modules[index], bays))
         return found

@@ -217,7 +217,7 @@ class SurrogateSite:
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
-        self._boxes: dict[Element, Box] = {}
+        self._boxes: dict[Element, Box | None] = {}  # none of a measure
         self._triangular = {
             structure.name: TriangularLoads(
                 [bay for bay in self.alternatives if bay.structure == structure.name]
@@ -282,13 +282,14 @@ class SurrogateSite:
         if not zone.items:
             sides = [zone.element_rectangle_m(element) for element in standing(layout)]
             return [self._box(in_line, zone.height_m) for in_line in _in_lines(sides)]
-        found = []
-        for element in standing(layout):
-            if element not in self._boxes:
-                height_m = zone.catalogue.variant(element).height_m
-                self._boxes[element] = self._box(zone.element_rectangle_m(element), height_m)
-            found.append(self._boxes[element])
-        return found
+        boxes = self._boxes
+        for element in layout:
+            if element not in boxes:
+                boxes[element] = None
+                if not isinstance(element, Measure):
+                    height_m = zone.catalogue.variant(element).height_m
+                    boxes[element] = self._box(zone.element_rectangle_m(element), height_m)
+        return [box for element in layout if (box := boxes[element]) is not None]
 
     def _box(self, rectangle_m: Rectangle, own_m: float | None) -> Box:
         """Return the rectangle and the top of a piece of a height, on its ground."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.observable import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
@@ -206,6 +207,36 @@ def test_a_reward_of_ones_own_names_its_terms() -> None:
     assert [step[1] for step in steps[1:]] == [1.0, 2.0, 3.0 - 7.0]
     terms = {"modules": 3.0, "end": -7.0, "invalid_actions": 0.0}
     assert steps[-1][4]["reward_terms"] == terms
+
+
+class PayAtTheEnd:
+    """A reward of a user's of many turns at once."""
+
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        return "first", "end"
+
+    def paid(self, begins: BoolArray, ended: BoolArray, reductions: FloatArray) -> FloatArray:
+        return np.stack((3.0 * begins, 10.0 * ended + reductions), axis=1)
+
+
+def test_a_reward_of_ones_own_may_be_of_many_turns_at_once() -> None:
+    steps = play(make(reward=PayAtTheEnd()), seed=1)
+    reduction = steps[-1][4]["reduction"]
+    assert [step[1] for step in steps[1:]] == [3.0, 0.0, 10.0 + reduction]
+    terms = {"first": 0.0, "end": 10.0 + reduction, "invalid_actions": 0.0}
+    assert steps[-1][4]["reward_terms"] == terms
+
+
+class NamesOnly:
+    """No reward: it names its terms and pays nothing."""
+
+    def terms(self, scenario: Scenario) -> tuple[str, ...]:
+        return ("end",)
+
+
+def test_an_object_that_pays_nothing_is_no_reward() -> None:
+    with pytest.raises(BlastEnvError, match="must have all methods of `Reward` or `EndReward`"):
+        make(reward=NamesOnly())
 
 
 class CountOfModules:
