@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 
 from blast_env.gas.simd import (
     all_zero,
-    called_rarely,
     everywhere,
     fetch,
     fill,
@@ -41,6 +40,8 @@ from blast_env.gas.simd import (
     larger,
     load,
     load_codes,
+    one_higher,
+    one_lower,
     own_frame,
     place,
     put,
@@ -50,10 +51,19 @@ from blast_env.gas.simd import (
     size,
     smaller,
     store,
-    with_first_of,
-    with_last_of,
 )
-from blast_env.gas.state import DENSITY, ENERGY, FUEL, FUSED, GAMMA, X_MOMENTUM, Extent, Reals
+from blast_env.gas.state import (
+    DENSITY,
+    ENERGY,
+    FLOOR,
+    FUEL,
+    FUSED,
+    GAMMA,
+    X_MOMENTUM,
+    Extent,
+    Reals,
+    lift,
+)
 
 Variables = tuple[Any, Any, Any, Any, Any, Any]
 """Vectors of density, velocity along the axis of a sweep and along the next two in cyclic order,
@@ -65,9 +75,6 @@ WORK_ROWS: Final = 2
 _LEAST_SHARE: Final = 0.1
 """Share of the cell's density or pressure below which reconstructed values are discarded, and the
 cell is treated as constant for that sweep."""
-
-_FLOOR: Final = 1e-6
-"""Floor of density and pressure, in units of those of still air."""
 
 _STILL_MOMENTUM: Final = 1e-12
 _STILL_FUEL: Final = 1e-24
@@ -100,39 +107,10 @@ def _safe_variables(
     """Return the variables after raising density and pressure to the floor."""
     here, per_r = _variables(state, cells, at, axis, fuel)
     # In this order, NaN is found.
-    if rarely(not everywhere(smaller(here[0], here[4]) >= fill(state, _FLOOR))):
-        _lift(state, cells, at, notes)
+    if rarely(not everywhere(smaller(here[0], here[4]) >= fill(state, FLOOR))):
+        lift(state, cells, at, notes)
         here, per_r = _variables(state, cells, at, axis, fuel)
     return here, per_r
-
-
-@njit(forceinline=False, error_model="numpy", fastmath=FUSED)
-def _lift(state: Any, cells: int, first: int, notes: Any) -> None:
-    """Raise the density and pressure of the cells of a vector to the floor, at the same velocity.
-
-    The number of cells that were below is added to the notes.
-    """
-    called_rarely()
-    for at in range(first, first + lanes_at(state)):
-        r, motion = get(state, DENSITY * cells + at), 0.0
-        slower = _FLOOR / r if r > 0.0 else 0.0
-        is_thin = not r >= _FLOOR
-        for k in range(X_MOMENTUM, ENERGY):
-            momentum = get(state, k * cells + at)
-            if is_thin:
-                momentum = momentum * slower if r > 0.0 else 0.0
-                put(state, k * cells + at, momentum)
-            motion += momentum * momentum
-        if is_thin:
-            put(state, DENSITY * cells + at, _FLOOR)
-            r = _FLOOR
-        # A little more than the floor, or rounding leaves the pressure below it.
-        least = 1.01 * _FLOOR / (GAMMA - 1.0) + 0.5 * motion / r
-        is_cold = not get(state, ENERGY * cells + at) >= least
-        if is_cold:
-            put(state, ENERGY * cells + at, least)
-        if is_thin or is_cold:
-            put(notes, 1, get(notes, 1) + 1.0)
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
@@ -168,13 +146,7 @@ def _ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _at_faces(
-    state: Any,
-    low: Variables,
-    here: Variables,
-    high: Variables,
-    per_r: Any,
-    ratio: Any,
-    fuel: bool,
+    state: Any, low: Variables, here: Variables, high: Variables, per_r: Any, ratio: Any, fuel: bool
 ) -> tuple[Variables, Variables]:
     """Return the variables of cells at their low and high faces after half a step.
 
@@ -356,20 +328,31 @@ def _still_air(state: Any, still: Any) -> Variables:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _sweep_across(
+def _ratio_at(gas: Any, axis: int, along: bool, m: int) -> Any:
+    """Return the ratio of time step to width of the cells of a vector."""
+    state, (along_x, along_y, along_z), ratio = gas[0], gas[3], gas[4]
+    if along:
+        return fill(state, ratio) * load(along_x, m * lanes_at(state))
+    return fill(state, ratio * get(along_y if axis == 1 else along_z, m))
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
+def _sweep_run(
     gas: Any,
     begin: int,
     stride: int,
     first: int,
     end: int,
     axis: int,
+    along: bool,
     ahead: int,
     fuel: bool,
     measure: bool,
-    ratio: Any,
-    recorded: Any,
 ) -> None:
-    """Move the gas in vectors of cells, one behind the other along y or z.
+    """Move the gas in vectors of cells, one behind the other.
+
+    Neighbours along y or z are the same lanes of the vectors before and after. Along x they are the
+    next lanes, and the cells beyond both ends of the run are still air or no gas.
 
     Args:
         gas: The places of the arrays.
@@ -378,161 +361,71 @@ def _sweep_across(
         first: Coordinate of the first vector.
         end: That of the last one + 1.
         axis: The axis.
+        along: Whether it is x, along which vectors lie.
         ahead: Distance of the vectors to be moved later, which are loaded into the cache.
         fuel: Whether the state has fuel.
         measure: Whether to note the speeds of signals.
-        ratio: Ratio of time step to cell side.
-        recorded: Places of the pressures and tables of recorded faces.
     """
-    state, code, still, narrow, work, notes, cells = gas
+    state, code, still, _, _, recorded, work, notes, cells = gas
     air, zero = _still_air(state, still), fill(state, 0.0)
-    vectors = axis * (cells // lanes_at(state))
-    low, before, flux_before, ratio_before = air, air, air, zero
+    vectors, apart = axis * (cells // lanes_at(state)), 1 if along else stride
+    flux_still = (zero, air[4], zero, zero, zero, zero)
+    before, above_before, flux_before = air, air, flux_still
     at = begin + first * stride
     here, per_r = _safe_variables(state, cells, at, axis, fuel, notes)
     for m in range(first, end + 1):
-        high, per_r_high, below, above, ratio_here = air, per_r, air, air, zero
+        after, per_r_after, below, above, flux = air, per_r, air, air, flux_still
         for k in range(FUEL + fuel):
             fetch(state, k * cells + at + ahead)
-        is_clear = all_zero(state, code, at - stride) and all_zero(state, code, at)
+        is_clear = all_zero(state, code, at - apart) and all_zero(state, code, at)
+        # 1. The variables at both faces of the cells.
         if m < end:
             if measure:
                 _note_signals(state, here, per_r, work)
             if m + 1 < end:
-                high, per_r_high = _safe_variables(state, cells, at + stride, axis, fuel, notes)
-            low_image, high_image = low, high
-            if not (is_clear and all_zero(state, code, at + stride)):
-                side_low = load_codes(state, code, at - stride)
-                side_high = load_codes(state, code, at + stride)
-                low_image = _ghost(side_low == zero, low, here, side_low)
-                high_image = _ghost(side_high == zero, high, here, side_high)
-            ratio_here = fill(state, ratio * get(narrow, m))
-            below, above = _at_faces(state, low_image, here, high_image, per_r, ratio_here, fuel)
-        left, right, wall = before, below, zero
-        if not is_clear:
-            side_left = load_codes(state, code, at - stride)
-            side_right = load_codes(state, code, at)
-            left = _ghost(side_left == zero, before, below, side_left)
-            right = _ghost(side_right == zero, below, before, side_right)
-            wall = side_left + side_right
-        flux = _hllc(state, left, right, wall, fuel)
-        _record_walls(flux[1], vectors + at // lanes_at(state), recorded, work)
+                after, per_r_after = _safe_variables(state, cells, at + stride, axis, fuel, notes)
+            low, high = before, after
+            if along:
+                low, high = one_lower(before, here), one_higher(here, after)
+            if not (is_clear and all_zero(state, code, at + apart)):
+                side_low = load_codes(state, code, at - apart)
+                side_high = load_codes(state, code, at + apart)
+                low = _ghost(side_low == zero, low, here, side_low)
+                high = _ghost(side_high == zero, high, here, side_high)
+            ratio = _ratio_at(gas, axis, along, m)
+            below, above = _at_faces(state, low, here, high, per_r, ratio, fuel)
+        # 2. The fluxes through the low faces; along x, the last ones are those of still air.
+        if m < end or not along:
+            left, right, wall = above_before, below, zero
+            if along:
+                left = one_lower(above_before, above)
+            if not is_clear:
+                side_left = load_codes(state, code, at - apart)
+                side_right = load_codes(state, code, at)
+                left, right = (
+                    _ghost(side_left == zero, left, right, side_left),
+                    _ghost(side_right == zero, right, left, side_right),
+                )
+                wall = side_left + side_right
+            flux = _hllc(state, left, right, wall, fuel)
+            _record_walls(flux[1], vectors + at // lanes_at(state), recorded, work)
+        # 3. The vector before this one, all of whose fluxes are known now.
         if m > first:
-            _update(state, cells, at - stride, axis, fuel, code, ratio_before, flux_before, flux)
-        low, here, per_r, before, flux_before = here, high, per_r_high, above, flux
-        ratio_before = ratio_here
+            flux_high = one_higher(flux_before, flux) if along else flux
+            ratio = _ratio_at(gas, axis, along, m - 1)
+            _update(state, cells, at - stride, axis, fuel, code, ratio, flux_before, flux_high)
+        before, here, per_r, above_before, flux_before = here, after, per_r_after, above, flux
         at += stride
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _one_lower(before: Variables, here: Variables) -> Variables:
-    """Return the variables one lane lower."""
-    return (
-        with_last_of(before[0], here[0]),
-        with_last_of(before[1], here[1]),
-        with_last_of(before[2], here[2]),
-        with_last_of(before[3], here[3]),
-        with_last_of(before[4], here[4]),
-        with_last_of(before[5], here[5]),
-    )
-
-
-@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _one_higher(here: Variables, after: Variables) -> Variables:
-    """Return the variables one lane higher."""
-    return (
-        with_first_of(here[0], after[0]),
-        with_first_of(here[1], after[1]),
-        with_first_of(here[2], after[2]),
-        with_first_of(here[3], after[3]),
-        with_first_of(here[4], after[4]),
-        with_first_of(here[5], after[5]),
-    )
-
-
-@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _sweep_along(
-    gas: Any,
-    begin: int,
-    first: int,
-    end: int,
-    ahead: int,
-    fuel: bool,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
-) -> None:
-    """Move the gas in a row of vectors along x; see `_sweep_across`.
-
-    The cells beyond both ends of the row of vectors are still air or no gas.
-    """
-    state, code, still, narrow, work, notes, cells = gas
-    lanes = lanes_at(state)
-    air, zero, step = _still_air(state, still), fill(state, 0.0), fill(state, ratio)
-    flux_still = (zero, air[4], zero, zero, zero, zero)
-    before, above_before, flux_before = air, air, flux_still
-    at = begin + first * lanes
-    here, per_r = _safe_variables(state, cells, at, 0, fuel, notes)
-    for m in range(first, end + 1):
-        for k in range(FUEL + fuel):
-            fetch(state, k * cells + at + ahead)
-        after, per_r_after, above, flux = air, per_r, air, flux_still
-        if m < end:
-            if measure:
-                _note_signals(state, here, per_r, work)
-            if m + 1 < end:
-                after, per_r_after = _safe_variables(state, cells, at + lanes, 0, fuel, notes)
-            low, high = _one_lower(before, here), _one_higher(here, after)
-            is_clear = (
-                all_zero(state, code, at - 1)
-                and all_zero(state, code, at)
-                and all_zero(state, code, at + 1)
-            )
-            side_low, side_here = zero, zero
-            if not is_clear:
-                side_low, side_here = load_codes(state, code, at - 1), load_codes(state, code, at)
-                side_high = load_codes(state, code, at + 1)
-                low = _ghost(side_low == zero, low, here, side_low)
-                high = _ghost(side_high == zero, high, here, side_high)
-            ratio_here = step * load(narrow, m * lanes)
-            below, above = _at_faces(state, low, here, high, per_r, ratio_here, fuel)
-            left, right = _one_lower(above_before, above), below
-            if not is_clear:
-                left, right = (
-                    _ghost(side_low == zero, left, right, side_low),
-                    _ghost(side_here == zero, right, left, side_here),
-                )
-            flux = _hllc(state, left, right, side_low + side_here, fuel)
-            _record_walls(flux[1], at // lanes, recorded, work)
-        if m > first:
-            ratio_before = step * load(narrow, (m - 1) * lanes)
-            _update(
-                state, cells, at - lanes, 0, fuel, code, ratio_before, flux_before,
-                _one_higher(flux_before, flux),
-            )  # fmt: skip
-        before, here, per_r, above_before, flux_before = here, after, per_r_after, above, flux
-        at += lanes
-
-
-@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _sweep_rows(
-    gas: Any,
-    bounds: Any,
-    shape: tuple[int, int, int],
-    y: int,
-    is_first: bool,
-    fuel: bool,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
-) -> None:
+def _sweep_rows(gas: Any, bounds: Any, y: int, is_first: bool, fuel: bool, measure: bool) -> None:
     """Move the gas along x in the rows of all planes at a y.
 
     Before the other sweep of the layer, the next layer is loaded into the cache; after it, the next
     row. A run of vectors ends with the first one without air: it holds the face before it.
     """
-    extent, airy = bounds
-    planes, rows, length = shape
+    extent, airy, (planes, rows, length) = bounds
     lanes = lanes_at(gas[0])
     vectors = length // lanes
     ahead = length if is_first else rows * length
@@ -551,30 +444,20 @@ def _sweep_rows(
                 end += 1
             if first < end:
                 end = min(end + 1, last)
-                _sweep_along(gas, row * length, first, end, ahead, fuel, measure, ratio, recorded)
+                _sweep_run(gas, row * length, lanes, first, end, 0, True, ahead, fuel, measure)
             first = end
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _sweep_columns(
-    gas: Any,
-    bounds: Any,
-    shape: tuple[int, int, int],
-    layer: int,
-    axis: int,
-    is_first: bool,
-    fuel: bool,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
+    gas: Any, bounds: Any, layer: int, axis: int, is_first: bool, fuel: bool, measure: bool
 ) -> None:
     """Move the gas along y in a plane, or along z in the rows of all planes at a y.
 
     Before the other sweep of the layer, the next layer is loaded into the cache; otherwise the next
     vectors of the rows, which lie far apart in memory.
     """
-    extent, airy = bounds
-    planes, rows, length = shape
+    extent, airy, (planes, rows, length) = bounds
     lanes = lanes_at(gas[0])
     vectors = length // lanes
     # 1. The rows across which the gas moves, and the vectors of their extents.
@@ -595,9 +478,9 @@ def _sweep_columns(
             while m < m1 and _has_gas(extent, airy, begin + m * apart, v, vectors, lanes):
                 m += 1
             if first < m:
-                _sweep_across(
-                    gas, begin * length + v * lanes, apart * length, first, m, axis, ahead, fuel,
-                    measure, ratio, recorded,
+                _sweep_run(
+                    gas, begin * length + v * lanes, apart * length, first, m, axis, False, ahead,
+                    fuel, measure,
                 )  # fmt: skip
             m += 1
 
@@ -609,69 +492,28 @@ def _has_gas(extent: Any, airy: Any, row: int, v: int, vectors: int, lanes: int)
     return overlaps and get(airy, row * vectors + v) != 0
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
-def _sweep(
-    gas: Any,
-    narrow: Any,
-    bounds: Any,
-    shape: tuple[int, int, int],
-    axes: tuple[int, int],
-    first: int,
-    end: int,
-    fuel: bool,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
-) -> None:
-    """Move the gas in the layers from first to end; see `sweep`."""
-    state, code, still, work, notes, cells = gas
-    along_x, along_y, along_z = narrow
-    for k in range(first, end):
-        for number in range(2):
-            axis = axes[number]
-            is_first = number == 0 and axes[1] >= 0
-            last = measure and (number == 1 or axes[1] < 0)
-            if axis == 0:
-                own = state, code, still, along_x, work, notes, cells
-                _sweep_rows(own, bounds, shape, k, is_first, fuel, last, ratio, recorded)
-            elif axis > 0:
-                across = along_y if axis == 1 else along_z
-                own = state, code, still, across, work, notes, cells
-                _sweep_columns(own, bounds, shape, k, axis, is_first, fuel, last, ratio, recorded)
+def _sweep_of(fuel: bool) -> Any:
+    """Return the sweeps of a state with or without fuel, as `sweep`; compiled for each."""
+
+    @njit(forceinline=False, error_model="numpy", fastmath=FUSED)
+    def sweeps(
+        gas: Any, bounds: Any, axes: tuple[int, int], first: int, end: int, measure: bool
+    ) -> None:
+        own_frame()
+        for k in range(first, end):
+            for number in range(2):
+                axis = axes[number]
+                is_first = number == 0 and axes[1] >= 0
+                last = measure and (number == 1 or axes[1] < 0)
+                if axis == 0:
+                    _sweep_rows(gas, bounds, k, is_first, fuel, last)
+                elif axis > 0:
+                    _sweep_columns(gas, bounds, k, axis, is_first, fuel, last)
+
+    return sweeps
 
 
-@njit(forceinline=False, error_model="numpy", fastmath=FUSED)
-def _sweep_with_fuel(
-    gas: Any,
-    narrow: Any,
-    bounds: Any,
-    shape: tuple[int, int, int],
-    axes: tuple[int, int],
-    first: int,
-    end: int,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
-) -> None:
-    own_frame()
-    _sweep(gas, narrow, bounds, shape, axes, first, end, True, measure, ratio, recorded)
-
-
-@njit(forceinline=False, error_model="numpy", fastmath=FUSED)
-def _sweep_without_fuel(
-    gas: Any,
-    narrow: Any,
-    bounds: Any,
-    shape: tuple[int, int, int],
-    axes: tuple[int, int],
-    first: int,
-    end: int,
-    measure: bool,
-    ratio: Any,
-    recorded: Any,
-) -> None:
-    own_frame()
-    _sweep(gas, narrow, bounds, shape, axes, first, end, False, measure, ratio, recorded)
+_with_fuel, _without_fuel = _sweep_of(True), _sweep_of(False)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
@@ -685,13 +527,9 @@ def sweep(
     end: int,
     measure: bool,
     ratio: Any,
-    narrow_x: Reals,
-    narrow_y: Reals,
-    narrow_z: Reals,
+    narrow: tuple[Reals, Reals, Reals],
     still: Reals,
-    pressure: Reals,
-    walls: NDArray[np.int32],
-    first_wall: NDArray[np.int32],
+    recorded: tuple[Reals, NDArray[np.int32], NDArray[np.int32]],
     work: Reals,
     notes: NDArray[np.float64],
 ) -> None:
@@ -710,27 +548,22 @@ def sweep(
         end: Last layer + 1.
         measure: Whether to note the speeds of signals in the last sweep.
         ratio: Ratio of time step to cell side.
-        narrow_x: Ratio of cell side to the width of each cell along x.
-        narrow_y: The same along y.
-        narrow_z: The same along z.
+        narrow: Ratio of cell side to the width of each cell along x, y and z.
         still: State of still air (5 or 6,).
-        pressure: Pressures on the recorded faces, updated in place.
-        walls: Lane of the cell on the high side, and index of the face, vector by vector (k, 2).
-        first_wall: First entry of each vector in `walls`, for faces normal to x, then to y and z.
+        recorded: Pressures on the recorded faces, updated in place; lane of the cell on the high
+            side and index of the face, vector by vector (k, 2); the first of these entries of each
+            vector, for faces normal to x, then to y and z.
         work: A workspace (WORK_ROWS, lanes).
         notes: Fastest signal and number of cells raised to the floor; updated in place (2,).
     """
     work[1] = 0.0
-    gas = (place(state), place(code), place(still), place(work), place(notes), code.size)
-    narrow = (place(narrow_x), place(narrow_y), place(narrow_z))
-    bounds = (place(extent), place(airy))
-    recorded = (place(pressure), place(walls), place(first_wall))
+    widths = place(narrow[0]), place(narrow[1]), place(narrow[2])
+    pressures = place(recorded[0]), place(recorded[1]), place(recorded[2])
+    own = place(work), place(notes), code.size
+    gas = (place(state), place(code), place(still), widths, ratio, pressures, *own)
+    bounds = place(extent), place(airy), code.shape
     if len(state) > FUEL:
-        _sweep_with_fuel(
-            gas, narrow, bounds, code.shape, axes, first, end, measure, ratio, recorded
-        )
+        _with_fuel(gas, bounds, axes, first, end, measure)
     else:
-        _sweep_without_fuel(
-            gas, narrow, bounds, code.shape, axes, first, end, measure, ratio, recorded
-        )
+        _without_fuel(gas, bounds, axes, first, end, measure)
     notes[0] = max(notes[0], work[1].max())

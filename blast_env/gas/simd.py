@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from llvmlite import ir
 from llvmlite.binding import get_host_cpu_features
-from numba import types
+from numba import njit, types
 from numba.extending import intrinsic, models, overload, register_model
 
 _VECTOR_BYTES: Final = 64 if get_host_cpu_features().get("avx512f", False) else 32
@@ -251,6 +251,32 @@ def with_last_of(_context: Any, before: Any, here: Any) -> tuple[Any, Callable[.
 def with_first_of(_context: Any, here: Any, after: Any) -> tuple[Any, Callable[..., Any]]:
     """Return the values one lane higher: `here` without its first, then the first of `after`."""
     return here(here, after), _shuffle(1)
+
+
+@njit(forceinline=True)
+def one_lower(before: Any, here: Any) -> Any:
+    """Return six vectors one lane lower; see `with_last_of`."""
+    return (
+        with_last_of(before[0], here[0]),
+        with_last_of(before[1], here[1]),
+        with_last_of(before[2], here[2]),
+        with_last_of(before[3], here[3]),
+        with_last_of(before[4], here[4]),
+        with_last_of(before[5], here[5]),
+    )
+
+
+@njit(forceinline=True)
+def one_higher(here: Any, after: Any) -> Any:
+    """Return six vectors one lane higher; see `with_first_of`."""
+    return (
+        with_first_of(here[0], after[0]),
+        with_first_of(here[1], after[1]),
+        with_first_of(here[2], after[2]),
+        with_first_of(here[3], after[3]),
+        with_first_of(here[4], after[4]),
+        with_first_of(here[5], after[5]),
+    )
 
 
 @_lane

@@ -139,6 +139,34 @@ class Recorder(Protocol):
         """Read the gas after a step of `step_s`."""
 
 
+def _check(precision: str, threads: int, courant: float) -> None:
+    """Refuse settings of the solver that are out of bounds (`BlastEnvError`)."""
+    if precision not in _DTYPES:
+        raise BlastEnvError(f"precision is {precision!r}, but must be 'single' or 'double'")
+    if threads < 1:
+        raise BlastEnvError(f"threads is {threads}, but must be at least 1")
+    if not 0.0 < courant <= 1.0:
+        raise BlastEnvError(f"courant is {courant}, but must be above 0 and at most 1")
+
+
+def _check_gas(
+    pressure_pa: float,
+    density_kg_m3: float,
+    with_fuel: bool,
+    burning: Burning | None,
+    settling: Settling | None,
+) -> None:
+    """Refuse properties of the gas that are out of bounds (`BlastEnvError`)."""
+    if not (pressure_pa > 0.0 and density_kg_m3 > 0.0):
+        raise BlastEnvError(
+            f"still air has {pressure_pa} Pa and {density_kg_m3} kg/m^3, but both must be above 0"
+        )
+    if burning is not None and not (with_fuel and burning.time_s > 0.0):
+        raise BlastEnvError(f"burning is {burning}, but needs with_fuel=True and a time above 0 s")
+    if settling is not None and not settling.hottest > 1.0:
+        raise BlastEnvError(f"hottest is {settling.hottest}, but must be above 1, still air's")
+
+
 class GasSolver:
     """A gas in a grid, at rest until `set_state` is called.
 
@@ -179,23 +207,8 @@ class GasSolver:
         pressure_pa: float = AIR_PRESSURE_PA,
         density_kg_m3: float = AIR_DENSITY_KG_M3,
     ) -> None:
-        if precision not in _DTYPES:
-            raise BlastEnvError(f"precision is {precision!r}, but must be 'single' or 'double'")
-        if threads < 1:
-            raise BlastEnvError(f"threads is {threads}, but must be at least 1")
-        if not 0.0 < courant <= 1.0:
-            raise BlastEnvError(f"courant is {courant}, but must be above 0 and at most 1")
-        if not (pressure_pa > 0.0 and density_kg_m3 > 0.0):
-            raise BlastEnvError(
-                f"still air has {pressure_pa} Pa and {density_kg_m3} kg/m^3, "
-                "but both must be above 0"
-            )
-        if burning is not None and not (with_fuel and burning.time_s > 0.0):
-            raise BlastEnvError(
-                f"burning is {burning}, but needs with_fuel=True and a time above 0 s"
-            )
-        if settling is not None and not settling.hottest > 1.0:
-            raise BlastEnvError(f"hottest is {settling.hottest}, but must be above 1, still air's")
+        _check(precision, threads, courant)
+        _check_gas(pressure_pa, density_kg_m3, with_fuel, burning, settling)
         self.grid = grid
         self.faces = faces
         self.recorders = tuple(recorders)
@@ -210,34 +223,39 @@ class GasSolver:
         self._settling = settling
         self._skip = skip_still_air
         self._threads = threads
-        dtype = _DTYPES[precision]
-        nx, ny, _ = grid.array_shape
-        # Rows are whole vectors, an odd number of them, in an odd number of rows, or else all
-        # planes would compete for the same few lines of the cache.
+        self._make_arrays(np.dtype(_DTYPES[precision]), 6 if with_fuel else 5)
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+        self._signal = 0.0
+        self._floored_cells = 0
+
+    def _make_arrays(self, dtype: np.dtype[Any], components: int) -> None:
+        """Make the state, still air everywhere, and what compiled code needs beside it."""
+        # 1. The codes of the cells. Rows are whole vectors, an odd number of them, in an odd number
+        # of rows, or else all planes would compete for the same few lines of the cache.
+        nx, ny, _ = self.grid.array_shape
         vectors = -(-nx // LANES) // 2 * 2 + 1
         beyond = ((0, 0), (0, 1 - ny % 2), (0, vectors * LANES - nx))
-        self._code = np.pad(grid.codes(), beyond, constant_values=OPEN)
-        components = 6 if with_fuel else 5
+        self._code = np.pad(self.grid.codes(), beyond, constant_values=OPEN)
+        lanes = lanes_of(dtype.itemsize)
+        airy = (self._code == state.AIR).reshape(*self._code.shape[:2], -1, lanes).any(axis=3)
+        self._airy = airy.astype(np.int8)
+        # 2. The state and its extent.
         self._still = np.zeros(components, dtype=dtype)
         self._still[state.DENSITY] = 1.0
         self._still[ENERGY] = 1.0 / (GAMMA - 1.0)
         self.state: Reals = np.empty((components, *self._code.shape), dtype=dtype)
         self.state[:] = self._still[:, None, None, None]
-        self.wall_pressure: Reals = np.ones(len(faces), dtype=dtype)
-        lanes = lanes_of(self.state.itemsize)
-        airy = (self._code == state.AIR).reshape(*self._code.shape[:2], -1, lanes).any(axis=3)
-        self._airy = airy.astype(np.int8)
-        self._walls, self._first_wall = faces.kernel_table(grid, self._code.shape, lanes)
-        self._work = [np.zeros((kernels.WORK_ROWS, lanes), dtype=dtype) for _ in range(threads)]
-        self._narrow = [grid.narrowness(axis).astype(dtype) for axis in range(3)]
-        self._narrow[0] = np.pad(self._narrow[0], beyond[2], mode="edge")
-        self._notes = np.zeros((threads, 2))
         self._whole = np.zeros((*self._code.shape[:2], 2), dtype=np.int32)
         self._whole[MARGIN:-MARGIN, MARGIN : ny - MARGIN] = MARGIN, nx - MARGIN
-        self.extent = np.zeros_like(self._whole) if skip_still_air else self._whole.copy()
-        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
-        self._signal = 0.0
-        self._floored_cells = 0
+        self.extent = np.zeros_like(self._whole) if self._skip else self._whole.copy()
+        # 3. Recorded faces, widths of cells, and a workspace of each thread.
+        self.wall_pressure: Reals = np.ones(len(self.faces), dtype=dtype)
+        self._walls, self._first_wall = self.faces.kernel_table(self.grid, self._code.shape, lanes)
+        x, y, z = (self.grid.narrowness(axis).astype(dtype) for axis in range(3))
+        self._narrow = np.pad(x, beyond[2], mode="edge"), y, z
+        shape = kernels.WORK_ROWS, lanes
+        self._work = [np.zeros(shape, dtype=dtype) for _ in range(self._threads)]
+        self._notes = np.zeros((self._threads, 2))
 
     @property
     def floored_cells(self) -> int:
@@ -417,8 +435,6 @@ class GasSolver:
             for axis in own:
                 state.widen(self.extent, self._whole, axis)
 
-        narrow_x, narrow_y, narrow_z = self._narrow
-
         def move(k: int, first: int, end: int) -> None:
             kernels.sweep(
                 self.state,
@@ -430,13 +446,9 @@ class GasSolver:
                 end,
                 last,
                 ratio,
-                narrow_x,
-                narrow_y,
-                narrow_z,
+                self._narrow,
                 self._still,
-                self.wall_pressure,
-                self._walls,
-                self._first_wall,
+                (self.wall_pressure, self._walls, self._first_wall),
                 self._work[k],
                 self._notes[k],
             )

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.gas.simd import fetch, get, place
+from blast_env.gas.simd import called_rarely, fetch, get, lanes_at, place, put
 
 Reals = NDArray[Any]
 
@@ -33,8 +33,40 @@ AIR, MIRROR, OPEN = 0, -1, 1
 FUSED: Final = {"contract"}
 """Fused multiply-add: a quarter faster, without reordering of operations."""
 
+FLOOR: Final = 1e-6
+"""Floor of density and pressure, in units of those of still air."""
+
 _ROWS_AHEAD: Final = 16
 """Rows between one that is read and one that is loaded into the cache."""
+
+
+@njit(forceinline=False, error_model="numpy", fastmath=FUSED)
+def lift(state: Any, cells: int, first: int, notes: Any) -> None:
+    """Raise the density and pressure of the cells of a vector to the floor, at the same velocity.
+
+    The number of cells that were below is added to the notes.
+    """
+    called_rarely()
+    for at in range(first, first + lanes_at(state)):
+        r, motion = get(state, DENSITY * cells + at), 0.0
+        slower = FLOOR / r if r > 0.0 else 0.0
+        is_thin = not r >= FLOOR
+        for k in range(X_MOMENTUM, ENERGY):
+            momentum = get(state, k * cells + at)
+            if is_thin:
+                momentum = momentum * slower if r > 0.0 else 0.0
+                put(state, k * cells + at, momentum)
+            motion += momentum * momentum
+        if is_thin:
+            put(state, DENSITY * cells + at, FLOOR)
+            r = FLOOR
+        # A little more than the floor, or rounding leaves the pressure below it.
+        least = 1.01 * FLOOR / (GAMMA - 1.0) + 0.5 * motion / r
+        is_cold = not get(state, ENERGY * cells + at) >= least
+        if is_cold:
+            put(state, ENERGY * cells + at, least)
+        if is_thin or is_cold:
+            put(notes, 1, get(notes, 1) + 1.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
