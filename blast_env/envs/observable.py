@@ -1,7 +1,7 @@
 """The observable part of an episode, and the parts common to all observations."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final, Protocol
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
-from blast_env.layout.batch import PlacementRules, Placements
+from blast_env.layout.batch import Placements
 from blast_env.layout.build_site import vehicle_reach, worst_places
 from blast_env.site import (
     AnySource,
@@ -169,25 +169,11 @@ def stock_shares(placements: Placements) -> FloatArray:
     and the share of the budget (1 without a budget).
     """
     left, shares = placements.left[:, 0], np.empty((len(placements.left), 3))
-    zones = _of_rules(placements, lambda item: (item.zone.budget or np.nan, item.zone.stock))
-    shares[:, 0] = left / zones[:, 1]
+    shares[:, 0] = left / placements.stock[:, 0]
     shares[:, 1] = np.minimum(left / FULL_STOCK, 1.0)
-    shares[:, 2] = np.where(np.isnan(zones[:, 0]), 1.0, placements.budget_left / zones[:, 0])
+    has_none = np.isnan(placements.budget)
+    shares[:, 2] = np.where(has_none, 1.0, placements.budget_left / placements.budget)
     return shares
-
-
-def _of_rules(
-    placements: Placements, values: Callable[[PlacementRules], Sequence[float]]
-) -> FloatArray:
-    """Return values of the rules of each placement (placements, n), or of all if equal (1, n)."""
-    rules = placements.rules
-    distinct = dict(zip(map(id, rules), rules, strict=True))
-    known = np.array([values(item) for item in distinct.values()], dtype=np.float64)
-    if len(distinct) == 1:
-        return known
-    numbers = {key: number for number, key in enumerate(distinct)}
-    found: FloatArray = known[[numbers[id(rule)] for rule in rules]]
-    return found
 
 
 def cost_shares(scenario: Scenario) -> FloatArray:
@@ -247,7 +233,6 @@ def items_placed(placements: Placements) -> Plane:
 
 def items_left(placements: Placements) -> FloatArray:
     """Return the remaining share of the pieces of each item (placements, items)."""
-    stocks = _of_rules(placements, lambda item: item.catalogue.stocks)
     left = np.minimum(placements.left[:, 1:], placements.left[:, :1])
-    shares: FloatArray = left / np.maximum(stocks, 1)
+    shares: FloatArray = left / np.maximum(placements.stock[:, 1:], 1)
     return shares

@@ -80,7 +80,9 @@ class LayoutBatch:
         occupancy: Number of the variant on each cell from 1, or 0 (layouts, rows, columns).
         table: 1 where a variant has its lower left cell (layouts, variants, rows, columns).
         left: Pieces left in all, then of each item (layouts, 1 + items).
+        stock: Pieces at first in all, then of each item (layouts, 1 + items).
         budget_left: Remaining budget; 0 without one (layouts,).
+        budget: Budget at first; NaN without one (layouts,).
         is_full: Whether nothing more can be placed (layouts,).
         placed: Number of elements in each (layouts,).
         rules: The rules for each layout.
@@ -92,7 +94,9 @@ class LayoutBatch:
         self.occupancy: NDArray[np.uint8] = np.zeros((count, *shape[1:]), dtype=np.uint8)
         self.table: NDArray[np.int8] = np.zeros((count, *shape), dtype=np.int8)
         self.left: IntArray = np.zeros((count, 1 + len(start.catalogue.stocks)), dtype=np.int64)
+        self.stock: IntArray = np.ones_like(self.left)
         self.budget_left: FloatArray = np.zeros(count)
+        self.budget: FloatArray = np.full(count, np.nan)
         self.is_full: BoolArray = np.zeros(count, dtype=np.bool_)
         self.placed: IntArray = np.zeros(count, dtype=np.int64)
         self.rules: list[PlacementRules] = [rules] * count
@@ -120,7 +124,9 @@ class LayoutBatch:
         rows = slice(None) if len(indices) == len(self.rules) else indices
         self.legal[rows], self.occupancy[rows] = start.legal, start.occupancy
         self.table[rows], self.left[rows] = table, left
+        self.stock[rows] = rules.zone.stock, *catalogue.stocks
         self.budget_left[rows] = start.budget_left or 0.0
+        self.budget[rows] = rules.zone.budget or np.nan
         self.is_full[rows] = not start.legal.any()
         self._numbers[rows, : len(numbers)], self.placed[rows] = numbers, len(numbers)
         self._sites[rows] = id(rules)
@@ -216,7 +222,8 @@ class LayoutBatch:
         return Placements(
             self.rules if are_all else [self.rules[index] for index in chosen],
             lambda position: self.elements(chosen[position]),
-            *(legal, self.occupancy[rows], self.left[rows], self.budget_left[rows]),
+            *(legal, self.occupancy[rows], self.left[rows], self.stock[rows]),
+            *(self.budget_left[rows], self.budget[rows]),
         )
 
 
@@ -233,12 +240,18 @@ class Placements:
     legal: BoolArray
     occupancy: NDArray[np.uint8]
     left: IntArray
+    stock: IntArray
     budget_left: FloatArray
+    budget: FloatArray
 
     @classmethod
     def of(cls, state: LayoutState) -> "Placements":
         """Return a single layout."""
         left = np.array([[state.stock_left, *state.stocks_left]])
-        budget_left = np.array([state.budget_left or 0.0])
-        arrays = state.legal[np.newaxis], state.occupancy[np.newaxis], left, budget_left
-        return cls([PlacementRules.of(state)], lambda _: state.layout, *arrays)
+        zone = state.scenario.zone
+        return cls(
+            *([PlacementRules.of(state)], lambda _: state.layout),
+            *(state.legal[np.newaxis], state.occupancy[np.newaxis]),
+            *(left, np.array([[zone.stock, *state.catalogue.stocks]])),
+            *(np.array([state.budget_left or 0.0]), np.array([zone.budget or np.nan])),
+        )
