@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +24,7 @@ from blast_env.app.offers import runs_blasts
 from blast_env.app.tasks import AnswerTask, ReportTask, SearchTask
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.work import Answer, Question, Status, Task
-from blast_env.design.search.advice import kinds_for
+from blast_env.design.search.advice import kinds_for, most_blasts
 from blast_env.design.search.advised import ROUNDS
 from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError
@@ -298,9 +299,9 @@ class Session:
             return fine * (layouts * MOST_BLASTS)
         if question is Question.ASSESS:
             return (fine + coarse[: self.engine.coarser is not None]) * layouts
-        searches = len(kinds_for(self.scenario)) * ROUNDS
-        searched = tuple(coarse[k % len(coarse)] for k in range(budget * searches))
-        return searched + fine * searches
+        kinds = kinds_for(self.scenario)
+        blasts, barriers = most_blasts(self.scenario, kinds, ROUNDS, budget, len(fine))
+        return tuple(islice(cycle(coarse), blasts)) + fine * barriers
 
     def _question(
         self, question: Question, target: LevelOfProtection, mass_error: float, budget: int

@@ -27,7 +27,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import blasts_running, print_written, resumable, save_figures
 from blast_env.design.search import DesignProblem
-from blast_env.design.search.advice import kinds_for
+from blast_env.design.search.advice import kinds_for, most_blasts
 from blast_env.design.search.advised import (
     ROUNDS,
     AdviceJudge,
@@ -102,11 +102,11 @@ def advise(
         f"{len(kinds)} kinds, at most {rounds} searches of {budget} blasts each, {engine.words}; "
         f"each result is judged with {len(threats)}, {judge.words}"
     )
-    searches = len(kinds) * rounds
+    blasts, barriers = most_blasts(site, kinds, rounds, budget, len(threats))
     coarse, fine = (
         [own.cost(site, threat.charge) for threat in threats] for own in (engine, judge)
     )
-    costs = [*islice(cycle(coarse), searches * budget), *fine * searches]
+    costs = [*islice(cycle(coarse), blasts), *fine * barriers]
     judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
     label = f"{len(kinds)} kinds"
     with resumable(resume_words(cache)), blasts_running(label, words, costs) as progress:

@@ -1,14 +1,16 @@
 """Estimates of the cost of a gas-dynamics blast before it begins.
 
-They come from a small model of the solver: the number of cells behind the front of a charge in the
-middle of the site, the number of steps until the loads are known, and the number of cells that a
-core updates per second. docs/howto/app.md compares estimates with measured costs.
+They come from a small model of the solver: the number of cells behind the front, in a half ball on
+the ground within the site, the number of steps until the loads are known, and the number of cells
+that a core updates per second. docs/engineers/gas.md compares estimates with measured costs.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cbrt, ceil, expm1, prod
 from typing import Final
+
+import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.gas.ending import SOUND_M_S, corners_m, sound_s, watched_structures
@@ -26,13 +28,16 @@ _AHEAD_M: Final = 12.0
 _AHEAD_AFTER_S: Final = 0.01
 """Final lead of the front of 100 kg over sound from the detonation, and its time constant."""
 
-_AFTER_S: Final = 0.01
+_AFTER_S: Final = 0.02
 """Duration of a run of 100 kg after sound has reached all the places that it waits for."""
 
 _PARTS: Final = 100
 """Number of intervals of a run in which updated cells are counted."""
 
-_CELLS_PER_S: Final = 35e6
+_ROWS: Final = 24
+"""Number of rows along y and z that stand for all, where cells behind a front are counted."""
+
+_CELLS_PER_S: Final = 25e6
 _BYTES_PER_CELL: Final = 28.0
 _PROCESS_BYTES: Final = 270e6
 _DRAWING_S: Final = 2.5
@@ -93,18 +98,40 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
     part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
     left_m, bottom_m, right_m, top_m = site.site_m
     sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
+    x_m, y_m = site.charge.position_m
+    place = (x_m - left_m) / sides_m[0], (y_m - bottom_m) / sides_m[1]
     steps, moved = 0.0, 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
         front_m = SOUND_M_S * now_s - ahead_m * expm1(-now_s / (_AHEAD_AFTER_S * scale))
         cell_m = settings.smallest_m * 2.0 ** sum(front_m > run_m for run_m in settings.doubled_m)
         step_s = cell_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
-        x, y, z = _cells_in(sides_m, cell_m, settings, margin=False)
+        counts = _cells_in(sides_m, cell_m, settings, margin=False)
         run = front_m / cell_m + 1.0
         steps += part_s / step_s
-        moved += part_s / step_s * min(x, 2.0 * run) * min(y, 2.0 * run) * min(z, run)
+        moved += part_s / step_s * _cells_behind(run, counts, place)
     cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
     return CostGuess(cells, ceil(steps), _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
+
+
+def _cells_behind(run: float, counts: tuple[int, ...], place: tuple[float, float]) -> float:
+    """Return the number of cells behind a front, in a half ball on the floor of a site.
+
+    Args:
+        run: Its radius in cells.
+        counts: Number of cells of the site along x, y and z.
+        place: Its centre, as shares of the site along x and y.
+    """
+    # Rows along x, by their distance from the centre in y and their height.
+    (left, right), (front, back) = (
+        (share * count, (1.0 - share) * count)
+        for share, count in zip(place, counts[:2], strict=True)
+    )
+    low, high, top = -min(front, run), min(back, run), min(float(counts[2]), run)
+    shares = (np.arange(_ROWS) + 0.5) / _ROWS
+    beside, above = np.meshgrid(low + (high - low) * shares, top * shares)
+    half = np.sqrt(np.maximum(run**2 - beside**2 - above**2, 0.0))
+    return float((np.minimum(left, half) + np.minimum(right, half)).mean()) * (high - low) * top
 
 
 def _cells_in(

@@ -1,5 +1,6 @@
 """`blast-env advise`: the verdict first, each kind of measure, and blasts for barriers alone."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from blast_env.design.search import (
     kinds_for,
     only,
 )
+from blast_env.design.search.advice import most_blasts
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.questions.probability import LevelProbability
@@ -27,6 +29,7 @@ from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import LayoutState, load_layout
 from blast_env.plots import DamagePrice, cheapest
 from blast_env.site import Charge
+from blast_env.surrogate import SurrogateEngine
 from tests.evaluation.test_response_objective import THREAT
 from tests.site.test_hardening import glazed_yard
 
@@ -76,6 +79,25 @@ def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
         advise(problem, MeasureKind.HARDEN, 0)
 
 
+@pytest.mark.parametrize("budget", [2, 7])
+def test_advice_takes_at_most_the_blasts_told(budget: int) -> None:
+    scenario = glazed_yard(target="low")
+    threats = (THREAT, replace(THREAT, charge=Charge((2.0, 6.0), 2.0)))
+    case = LoadCaseSet(scenario, threats)
+    problem = DesignProblem(BlastEvaluator(scenario, SurrogateEngine()), case)
+    judged: set[Layout] = set()
+
+    def judge(layout: Layout) -> Verdict:
+        judged.add(standing(layout))
+        return Verdict.FAILS
+
+    for kind in kinds_for(scenario):
+        advise_until(judge, problem, kind, budget, rounds=2)
+    blasts, barriers = most_blasts(scenario, kinds_for(scenario), 2, budget, len(threats))
+    assert len(threats) <= problem.evaluator.counts.blasts <= blasts
+    assert 1 <= len(judged) <= barriers
+
+
 def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) -> None:
     site, out = tmp_path / "yard.toml", tmp_path / "best.json"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
@@ -84,7 +106,8 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     files = ("--out", out, "--picture", picture)
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, cost, verdict = text.splitlines()[:3]
-    assert cost.startswith("up to 24 blasts of gas")  # 4 kinds, 2 searches of 2, each judged once
+    # No barrier, and 2 searches of 1 more for 2 of the 4 kinds, each judged once.
+    assert cost.startswith("up to 10 blasts of gas")
     assert first.startswith("4 kinds, at most 2 searches of 2 blasts each, gas, cells of 0.5 m; ")
     assert first.endswith("each result is judged with 1, gas, cells of 0.5 m")
     assert "walled_yard" in verdict

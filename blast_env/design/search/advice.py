@@ -116,6 +116,24 @@ def kinds_for(scenario: Scenario) -> tuple[MeasureKind, ...]:
     return (*kinds, MeasureKind.TOGETHER) if len(kinds) > 2 else tuple(kinds)
 
 
+def most_blasts(
+    scenario: Scenario, kinds: Iterable[MeasureKind], rounds: int, budget: int, threats: int
+) -> tuple[int, int]:
+    """Return the most blasts of a search, and the most barriers for a judge, of kinds of measures.
+
+    All kinds begin without a barrier, and those that place none have no other.
+
+    Args:
+        scenario: The scenario.
+        kinds: The kinds.
+        rounds: Largest number of searches for each.
+        budget: Largest number of blasts of a search.
+        threats: Number of threats.
+    """
+    searches = rounds * sum(bool(_items_of(scenario, kind)) for kind in kinds)
+    return threats + searches * (budget - threats), 1 + searches
+
+
 def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
     """Return the scenario restricted to one kind of measures."""
     zone = scenario.zone
