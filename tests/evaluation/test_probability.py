@@ -102,6 +102,25 @@ def test_a_thousand_draws_prove_no_certainty(value: float, text: str) -> None:
     assert probability_text(value, 1000) == text
 
 
+@pytest.mark.parametrize("draws", [1, 2, 3, 4, 5, 19, 20, 39, 41])
+def test_a_few_draws_tell_what_they_can(draws: int) -> None:
+    """As many classes as have two draws each; of fewer than four nothing drives the level."""
+    quantiles = (np.tile(np.arange(draws)[:, np.newaxis], 5) + 0.5) / draws
+    likely = LevelProbability(np.where(quantiles[:, 0] < 0.5, 3, 2), quantiles)
+    shares = likely.drivers(LevelOfProtection.MEDIUM).values()
+    assert len(shares) == (5 if draws >= 4 else 0)
+    assert all(0.0 < share <= 1.0 for share in shares)
+    assert likely.words(LevelOfProtection.MEDIUM).startswith("'medium' with ")
+    assert 0.0 <= float(probability_text(1.0, draws).split()[-1]) < 1.0
+
+
+def test_no_draw_and_no_bay_are_refused(found: Consequences) -> None:
+    with pytest.raises(BlastEnvError, match="draws is 0, must be an integer from 1"):
+        level_probability(found, Uncertainty(), 0)
+    with pytest.raises(BlastEnvError, match="deciding is 0, must be an integer from 1"):
+        level_probability(found, Uncertainty(), deciding=0)
+
+
 def test_a_mass_beyond_the_scaled_range_and_a_site_without_facades() -> None:
     with pytest.raises(BlastEnvError, match=r"mass is 0\.4, must be at most 0\.3"):
         Uncertainty(mass=0.4)

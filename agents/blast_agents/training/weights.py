@@ -41,7 +41,7 @@ def read_parameters(path: Path) -> Parameters:
     """Return the tensors of an archive of stable-baselines3.
 
     Raises:
-        BlastEnvError: If the file does not exist or is damaged.
+        BlastEnvError: If the file does not exist, is damaged or has no policy.
     """
     try:
         content = BytesIO(read_regular(path, _MOST_BYTES))
@@ -51,6 +51,8 @@ def read_parameters(path: Path) -> Parameters:
         check_zip(content)
         _, parameters, _ = load_from_zip_file(content, load_data=False, device="cpu")
         _check_tensors(parameters)
+        if "policy" not in parameters:
+            raise BadZipFile("it has no policy.pth")
     # torch reports a faulty file by exceptions of many types.
     except Exception as error:
         first_line = str(error).partition("\n")[0]

@@ -37,7 +37,7 @@ from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond
 from blast_env.response.sdof import impulses
 from blast_env.site.blast_site import Charge
-from blast_env.values import generator
+from blast_env.values import generator, whole_number
 
 MASS_RANGE: Final = 1.3
 """Largest factor on the mass of a charge, and on its inverse, for which histories are scaled."""
@@ -93,9 +93,13 @@ def _scaled(response: BuildingResponse, charge: Charge) -> BuildingResponse:
 DRAWS: Final = 1000
 """Default number of draws."""
 
+_MOST_DRAWS: Final = 1_000_000
+
 _DRIVERS: Final = ("charge", "load model", "cells", "glass", "panels")
 _OF_INTERVAL: Final = 1.959964
-_BINS: Final = 20
+_CLASSES: Final = 20
+_OF_CLASS: Final = 2
+"""Least draws in a class: of one, chance is not known."""
 
 DECIDING: Final = 3
 """Default number of bays of each component that are drawn, by damage, by peak and by impulse."""
@@ -163,20 +167,21 @@ class LevelProbability:
         """Return the first-order index of each uncertain quantity, the largest first.
 
         It is the share of the variance of "the level is reached" that the quantity explains alone,
-        from the means of 20 classes of it, less what chance leaves in them. Empty if the level is
-        always reached, or never.
+        from the means of 20 classes of it, or fewer so that each has two draws, less what chance
+        leaves in them. Empty if the level is always reached, or never, or of fewer than four draws.
         """
         reached = (self.levels >= level).astype(np.float64)
         total = float(reached.var())
-        if total == 0.0:
+        count = min(_CLASSES, len(reached) // _OF_CLASS)
+        if total == 0.0 or count < 2:
             return {}
         found: dict[str, float] = {}
         for name, quantile in zip(_DRIVERS, self.quantiles.T, strict=True):
             # First-order index: the variance of the class means over the whole variance, less what
             # means of so few draws vary by chance.
-            classes = np.array_split(reached[np.argsort(quantile)], _BINS)
+            classes = np.array_split(reached[np.argsort(quantile)], count)
             between = np.var([members.mean() for members in classes])
-            chance = np.mean([members.var() / max(len(members) - 1, 1) for members in classes])
+            chance = np.mean([members.var() / (len(members) - 1) for members in classes])
             found[name] = max(float(between - chance), 0.0) / total
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
@@ -191,9 +196,10 @@ class LevelProbability:
 def probability_text(value: float, draws: int) -> str:
     """Return a probability as text; at an end, its bound of 95 % confidence.
 
-    It is a share of some draws; of none, the bound is three of their number.
+    It is a share of some draws; of none, the bound is the probability with which as many draws all
+    miss it in one case of twenty.
     """
-    bound = 3.0 / draws
+    bound = 1.0 - 0.05 ** (1.0 / draws)
     if value >= 1.0:
         return f"more than {1.0 - bound:.3f}"
     if value <= 0.0:
@@ -214,8 +220,10 @@ def level_probability(
     impulse.
 
     Raises:
-        BlastEnvError: If there are no buildings with a facade.
+        BlastEnvError: If there are no buildings with a facade, or there is no draw or deciding bay.
     """
+    draws = whole_number("draws", draws, 1, _MOST_DRAWS)
+    deciding = whole_number("deciding", deciding, 1, _MOST_DRAWS)
     if not judged.responses:
         raise BlastEnvError("no building has a facade: there is no level of protection")
     # 1. Quantiles of all uncertain quantities; 2. in each draw the lowest level of any deciding
