@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -259,7 +259,6 @@ def test_values_are_counted_before_they_are_read() -> None:
         parse_json("[" + "[]," * 1_600_000 + "[]]")
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.sampled_from(NUMBERS), st.sampled_from((5e-324, 1e-300, 1e38, 1e300, -1.0, True, "1.0")))
 def test_any_number_of_a_site_is_refused_or_gives_finite_numbers(
     path: tuple[str | int, ...], value: Any

@@ -55,7 +55,7 @@ def form(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return FORMATS[request.param](tmp_path_factory.mktemp("format"))
 
 
-@settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_read(form: Format, data: st.DataObject) -> None:
     content = data.draw(damaged(form.samples))

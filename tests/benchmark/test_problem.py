@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.benchmark import (
@@ -216,7 +216,6 @@ SITES = ("control_room", "courtyard", "hotel_forecourt", "shopping_street", "per
 def test_any_keys_are_a_legal_layout(site: str) -> None:
     space = LayoutSpace(load_scenario(site))
 
-    @settings(max_examples=20, deadline=None)
     @given(st.lists(st.floats(-3.0, 3.0), min_size=space.keys, max_size=space.keys))
     def check(keys: list[float]) -> None:
         layout = space.from_keys(keys)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import typer
 from blast_agents.training.callbacks import ValidationCallback
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 from typer.core import TyperGroup
@@ -89,7 +89,6 @@ def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
 # Tables.
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.lists(st.sampled_from(WORDS), min_size=1, max_size=3), min_size=1, max_size=9),
     st.integers(40, 130),

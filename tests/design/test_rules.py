@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from blast_env.design import (
@@ -66,7 +66,6 @@ def test_wall_stands_upright_where_it_is_asked_for(share: float, column: int) ->
     share=st.floats(0.0, 1.0),
     stock=st.integers(1, 24),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
 def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
     angle: float, distance_m: float, share: float, stock: int
 ) -> None:
@@ -100,7 +99,6 @@ def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
     budget=st.floats(4.0, 20.0),
     way_m=st.sampled_from([1.0, 2.5, 4.0]),
 )
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_a_wall_keeps_every_condition(
     charge_y_m: float, share: float, blocked: tuple[int, int, int, int], budget: float, way_m: float
 ) -> None:

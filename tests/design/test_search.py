@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env import load_scenario
@@ -65,7 +65,6 @@ def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: DesignProblem) ->
 
 
 @given(budget=st.integers(1, 12), threats=st.integers(1, 4))
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_the_budget_is_used_as_far_as_it_goes_and_no_farther(budget: int, threats: int) -> None:
     """And what a cache knows is paid for all the same: else a search would find more again."""
     it = session(_SHARED, budget, threats)
@@ -203,7 +202,6 @@ SITES["budget_and_way"] = site(
 
 
 @given(name=st.sampled_from(sorted(SITES)), seed=st.integers(0, 10_000))
-@settings(max_examples=12, deadline=None, derandomize=True)
 def test_every_neighbour_is_legal_and_close(name: str, seed: int) -> None:
     """A walk of many moves on sites with budgets and access ways.
 
@@ -246,7 +244,6 @@ def test_random_walls_hang_together_more_than_random_modules() -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_a_cut_takes_each_side_from_one_parent(seed: int) -> None:
     """Two columns side by side: one piece of the one, the complement of it of the other."""
     first, second = (tuple((row, column) for row in range(8)) for column in (0, 1))

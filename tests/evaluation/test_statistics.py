@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import t as student_t
 
@@ -94,7 +94,6 @@ def coverage(
     return float(np.mean([e.low <= 1.0 - share <= e.high for e in estimates]))
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     share=st.floats(0.1, 1.0),
     noise=st.floats(0.05, 1.0),

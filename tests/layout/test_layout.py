@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, LayoutError
@@ -88,7 +88,6 @@ JSON = st.recursive(
     st.randoms(use_true_random=False),
     st.dictionaries(st.text(), JSON.filter(lambda value: "inf" not in repr(value)), max_size=3),
 )
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_every_layout_that_can_be_placed_comes_back(
     tmp_path_factory: pytest.TempPathFactory, random: Any, provenance: dict[str, Any]
 ) -> None:
@@ -238,7 +237,6 @@ KEYS = st.fixed_dictionaries(
 
 
 @given(st.one_of((JSON | KEYS).map(json.dumps).map(str.encode), st.binary(max_size=40)))
-@settings(max_examples=25, deadline=None, derandomize=True)
 def test_any_layout_file_gives_cells_or_the_layout_error(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import LayoutError
@@ -43,7 +43,6 @@ def assert_free_explain_and_place_agree(placement: LayoutState, cells: list[Cell
 
 @pytest.mark.slow
 @given(zone_documents(), st.integers(0, 10**6))
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int) -> None:
     scenario = buildable(document)
     zone = scenario.zone
@@ -63,7 +62,6 @@ def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int
 
 
 @given(zone_documents(), st.integers(0, 10**6), st.data())
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_order_does_not_matter_and_fewer_modules_are_no_worse(
     document: Document, seed: int, data: st.DataObject
 ) -> None:

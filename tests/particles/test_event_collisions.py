@@ -4,7 +4,7 @@ from math import ceil, cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
@@ -47,7 +47,6 @@ def elastic_rules(restitution: float, at_module: float = 1.0) -> SimulationParam
     speed=st.floats(50.0, 1e5),
     drift=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
 )
-@settings(max_examples=75, deadline=None, derandomize=True)
 def test_two_balls_of_any_mass_and_size_from_any_side(
     masses: tuple[float, float],
     radii: tuple[float, float],

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
@@ -142,7 +142,6 @@ CELLS = st.lists(
 
 
 @given(CELLS, st.integers(0, 2**32 - 1))
-@settings(max_examples=75, deadline=None, derandomize=True)
 def test_first_hits_on_any_set_of_modules(cells: list[tuple[int, int]], seed: int) -> None:
     check_first_hits(rays([wall((92.0, 92.0), 8, 8, cells=tuple(cells))], seed))
 
@@ -153,7 +152,6 @@ def test_first_hits_on_any_set_of_modules(cells: list[tuple[int, int]], seed: in
     st.sampled_from([(0.0, 0.5), (1.0, 0.0), (0.3, 0.7), (2.0, 2.0), (1e-10, 0.0)]),
     st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=75, deadline=None, derandomize=True)
 def test_first_hits_on_two_structures_side_by_side(
     cells: list[tuple[int, int]],
     others: list[tuple[int, int]],
@@ -312,14 +310,12 @@ def check_scene(of_scene: Scene) -> EndReason | None:
 
 
 @given(small_scenes(st.sampled_from((1e-6, 0.79, 1.0, 1e6)), SHARES))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_nothing_overlaps_leaves_or_becomes_nan_in_any_scene(of_scene: Scene) -> None:
     """Masses from 1e-6 to 1e6; then, or in an elastic gap, the limit of collisions may be met."""
     check_scene(of_scene)
 
 
 @given(small_scenes(st.sampled_from((0.1, 0.79, 1.0)), st.sampled_from((0.0, 0.1, 0.5, 0.9))))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_no_scene_with_masses_of_one_size_goes_on_without_end(of_scene: Scene) -> None:
     assert check_scene(of_scene) is not EndReason.EVENT_LIMIT
 

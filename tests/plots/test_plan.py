@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
@@ -155,7 +155,6 @@ def places_of_texts(
     return [thing.place for thing in settled]
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.integers(50, 550), st.integers(50, 350)), min_size=1, max_size=8))
 def test_texts_have_places_of_their_own_wherever_their_things_are(
     places: list[tuple[int, int]],

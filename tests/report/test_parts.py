@@ -4,7 +4,7 @@ from math import hypot, inf
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.answers.report import Limit, StudyOptions, StudyPlan
@@ -56,7 +56,6 @@ def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> 
 
 
 @given(st.floats(1.0, 3.0), st.floats(1.0, 7.0), st.floats(1.0, 3.0), st.floats(1.0, 7.0))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_no_place_of_a_street_is_nearer_than_those_looked_at(
     x0: float, y0: float, x1: float, y1: float
 ) -> None:

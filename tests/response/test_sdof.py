@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -95,7 +95,6 @@ def test_another_integrator_finds_the_same_ductility(resistance: float, share: f
     assert found == pytest.approx(solved.y[0].max(), rel=5e-3)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(0.05, 3.0), st.floats(0.2, 2.0))
 def test_smaller_steps_change_little(share: float, resistance: float) -> None:
     system = System(MASS, 1.0, Resistance.elastic_plastic(STIFFNESS, resistance * 1e3))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -198,7 +198,6 @@ def test_the_impulse_that_overturns_by_energy() -> None:
     friction=st.floats(0.0, 1.5),
     impulse=st.floats(100.0, 1e4),
 )
-@settings(max_examples=40)
 def test_a_piece_rocks_only_with_friction_above_base_over_height(
     height_m: float, share: float, friction: float, impulse: float
 ) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.site import Scenario, ScenarioError, parse_scenario
@@ -110,7 +110,6 @@ def wrong_values(value: Any) -> st.SearchStrategy[Any]:
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_misspelt_key_is_named_with_the_nearest_one(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(KEYS))
     key = str(path[-1])
@@ -134,7 +133,6 @@ def test_deleted_key_is_named() -> None:
 
 
 @given(st.data())
-@settings(max_examples=40, deadline=None, derandomize=True)
 def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(CASES))
     wrong = data.draw(wrong_values(value_at(document, path)))
@@ -152,7 +150,6 @@ def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     | st.integers(1, 4000).map(lambda exponent: -(10**exponent))
     | st.integers(13, 4000).map(lambda exponent: 10**exponent),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: float) -> None:
     document, path = case
     message = error_of_document(changed(document, path, wrong))
@@ -170,7 +167,6 @@ TOP_KEYS = sorted(set(Scenario.model_fields))
 
 
 @given(st.dictionaries(st.sampled_from(TOP_KEYS) | st.text(max_size=10), TOML_VALUES, max_size=8))
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_any_other_toml_is_an_error(document: Document) -> None:
     error_of_document(document)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import LayoutError
@@ -146,7 +146,6 @@ def test_the_stock_of_the_zone_bounds_all_items_together() -> None:
 
 
 @given(catalogue_documents(), st.integers(0, 10**6))
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None:
     """In every state on the way to a full zone, for every piece there could be."""
     scenario = buildable(document)

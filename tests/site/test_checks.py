@@ -3,7 +3,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
@@ -118,7 +118,6 @@ SOURCE = st.one_of(
 
 
 @given(SOURCE, POINT, SIZE)
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_distance_is_that_of_the_nearest_place_of_the_charge(
     source: PointSource | SegmentSource | RectangleSource,
     corner: tuple[float, float],

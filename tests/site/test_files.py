@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -77,7 +77,6 @@ def texts(least: int, most: int) -> st.SearchStrategy[str]:
         }
     )
 )
-@settings(max_examples=40, deadline=None, derandomize=True)
 def test_any_scenario_survives_saving(
     tmp_path_factory: pytest.TempPathFactory, values: Document
 ) -> None:

@@ -4,7 +4,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -39,7 +39,6 @@ def cell_area_m2(footprint: Footprint) -> float:
 
 
 @given(st.floats(0.0, 360.0), st.floats(4.0, 30.0), st.floats(4.0, 30.0))
-@settings(max_examples=60, deadline=None)
 def test_modules_have_the_area_of_the_polygon(angle: float, width: float, depth: float) -> None:
     """Within half a module along its edges: a row of centres lies on one side of a wall."""
     footprint = footprint_of(block(angle, width, depth))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.layout import build_site, draw_charge, usable_cells
@@ -185,7 +185,6 @@ HEIGHT = st.none() | st.floats(0.5, 60.0)
 
 
 @given(HEIGHT, HEIGHT, HEIGHT)
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_air_is_6_m_higher_than_anything_and_at_least_12_m(
     house: float | None, bunker: float | None, modules: float | None
 ) -> None:
@@ -203,7 +202,6 @@ def test_air_is_6_m_higher_than_anything_and_at_least_12_m(
 
 
 @given(st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 20.0), st.floats(0.0, 14.0)))
-@settings(max_examples=40, deadline=None, derandomize=True)
 def test_gauge_is_refused_just_where_there_is_no_air_within_half_a_metre(
     position_m: tuple[float, float, float],
 ) -> None:

@@ -62,9 +62,7 @@ def test_no_two_seeds_give_the_same_site(sites: tuple[Scenario, ...]) -> None:
     assert [site.name for site in sites] == [f"site_{seed}" for seed in range(len(sites))]
 
 
-@settings(
-    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=SEEDS)
 def test_a_saved_site_loads_as_the_same_site(seed: int, tmp_path: Path) -> None:
     site = generate_site(seed)

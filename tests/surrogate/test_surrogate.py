@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -107,7 +107,6 @@ def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
     return Surrogate(np.zeros(INPUTS), np.ones(INPUTS), *of_both, ABOUT)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
 @given(boxes=BOXES, more=st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)))
 def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
     boxes: list[tuple[float, float, float]], more: tuple[float, float, float]
@@ -120,7 +119,6 @@ def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
     assert shares(*mirrored) == pytest.approx(found, abs=1e-9)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
 @given(boxes=BOXES)
 @example(boxes=[(8.6875, 0.0, 3.0)])  # a way clips its corner over less than 0.1 m
 def test_what_is_open_is_the_weight_of_the_ways_that_meet_no_solid(
@@ -211,7 +209,6 @@ def test_compiled_layers_are_those_of_the_formula(rows: int) -> None:
     assert (networks.messages(related[-1:])[:, 0] == heard[:, -1]).all()
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
 @given(boxes=BOXES)
 def test_several_pieces_stop_what_the_one_stops_that_stops_most(
     boxes: list[tuple[float, float, float]],
@@ -233,7 +230,6 @@ def related(*solids: list[float], **changes: np.ndarray) -> np.ndarray:
     return solid_relations(**where, scale_m=1.0, solids=np.array(solids).reshape(-1, 5))[:, 0]
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
 @given(boxes=BOXES)
 def test_mirrors_and_quarter_turns_change_no_relation(
     boxes: list[tuple[float, float, float]],

@@ -7,7 +7,7 @@ from contextlib import suppress
 from math import prod
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.benchmark import Definition, stored_references
@@ -226,7 +226,6 @@ def test_malformed_arguments_are_refused_in_words() -> None:
     own = session()
 
     @given(st.sampled_from([*TOOLS]), st.dictionaries(st.sampled_from(("layout", "x")), values))
-    @settings(max_examples=60, deadline=None)
     def calls(name: str, arguments: dict) -> None:
         with suppress(BlastEnvError):  # no other error
             call_tool(own, name, arguments)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.site import AccessWay, Catalogue
@@ -109,7 +109,6 @@ def by_trial(passable: np.ndarray, width: int) -> np.ndarray:
 
 
 @given(st.integers(1, 4), st.tuples(st.integers(0, 6), st.integers(0, 6)), st.data())
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_way_and_closing_cells_are_those_of_a_search(
     width: int, extra: tuple[int, int], data: st.DataObject
 ) -> None:

@@ -112,7 +112,7 @@ boxes = st.lists(
 )
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(boxes=boxes, seed=st.integers(0, 999))
 @example(boxes=[(11, 2, 6, 12), (21, 16, 1, 1)], seed=999)  # a gap at a heading between two
 @example(boxes=[(9, 16, 5, 10), (20, 23, 5, 2), (8, 2, 3, 2), (10, 6, 4, 7)], seed=943)
@@ -150,7 +150,7 @@ def test_no_simulated_drive_is_faster_than_the_bound(
         assert (places_km_h[at] >= 0.98 * KM_H_PER_M_S * np.sqrt(square[driving])).all()
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(boxes=boxes)
 def test_more_obstacles_never_make_a_vehicle_faster(boxes: list[tuple[int, int, int, int]]) -> None:
     yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
@@ -160,7 +160,7 @@ def test_more_obstacles_never_make_a_vehicle_faster(boxes: list[tuple[int, int, 
     assert (more <= fewer).all()
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(boxes=boxes, arc_step=st.sampled_from([2, 6, 50]))
 def test_fewer_arcs_never_make_a_vehicle_faster(
     boxes: list[tuple[int, int, int, int]], arc_step: int
@@ -178,7 +178,7 @@ def test_fewer_arcs_never_make_a_vehicle_faster(
     assert np.isnan(some[1].places_km_h).sum() == np.isnan(some[0].places_km_h).sum()
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(boxes=boxes, over_km_h=st.lists(st.sampled_from([-0.1, 0.1]), min_size=5, max_size=5))
 def test_what_gives_way_is_what_a_full_search_of_every_round_says(
     boxes: list[tuple[int, int, int, int]], over_km_h: list[float]

@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
@@ -67,7 +67,6 @@ def whole_places(reach: Reach, width_m: float) -> set[tuple[int, int]]:
 places = st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1))
 
 
-@settings(max_examples=60, deadline=None)
 @given(stops=st.frozensets(places, max_size=40), width=st.integers(1, 4))
 @example(stops=frozenset((row, 5) for row in range(0, SIDE, 3)), width=2)  # just fits
 @example(stops=frozenset((row, 5) for row in range(0, SIDE, 3)), width=3)  # half a metre too wide
@@ -87,7 +86,6 @@ def test_it_gets_where_a_search_along_rows_and_columns_gets(
     assert {(int(row), int(column)) for row, column in np.argwhere(drawn)} == covered
 
 
-@settings(max_examples=25)
 @given(
     boxes=st.lists(st.tuples(*[st.integers(0, 27)] * 2, *[st.integers(1, 9)] * 2), max_size=8),
     width=st.integers(5, 11),

@@ -8,7 +8,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -103,7 +103,6 @@ def check(path: Path, options: ImportOptions) -> None:
 
 
 @given(st.lists(st.tuples(GEOMETRIES, PROPERTIES), min_size=1, max_size=3), OPTIONS)
-@settings(deadline=None, derandomize=True)
 def test_any_property_of_geojson(
     tmp_path_factory: pytest.TempPathFactory,
     drawn: list[tuple[dict[str, Any] | None, Any]],
@@ -124,7 +123,6 @@ def test_any_property_of_geojson(
 
 
 @given(VALUES, VALUES, VALUES, OPTIONS)
-@settings(deadline=None, derandomize=True)
 def test_any_member_of_geojson(
     tmp_path_factory: pytest.TempPathFactory,
     crs: Any,
@@ -174,7 +172,6 @@ def element(kind: str, attributes: Mapping[str, str], content: str = "") -> str:
     OPTIONS,
 )
 @example([("relation", {}, {})], [("member", {"type": "way"})], ImportOptions(protect=("House",)))
-@settings(deadline=None, derandomize=True)
 def test_any_attribute_of_an_extract(
     tmp_path_factory: pytest.TempPathFactory,
     objects: list[tuple[str, dict[str, str], dict[str, str]]],

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -37,7 +37,6 @@ def attempt(path: Path, **options: Any) -> None:
     st.sampled_from(sorted(CASES.glob("d_*.dxf"))),
     st.lists(st.tuples(st.integers(0, 9), KEYS, VALUES), min_size=1, max_size=4),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
 def test_any_attribute_of_an_entity(
     tmp_path_factory: pytest.TempPathFactory,
     case: Path,
@@ -61,7 +60,6 @@ def test_any_attribute_of_an_entity(
     st.sampled_from(sorted(CASES.glob("i_*.ifc"))),
     st.lists(st.tuples(st.integers(0, 400), st.integers(0, 9), VALUES), min_size=1, max_size=5),
 )
-@settings(max_examples=25, deadline=None, derandomize=True)
 def test_any_attribute_of_an_element(
     tmp_path_factory: pytest.TempPathFactory,
     case: Path,

@@ -14,7 +14,7 @@ from ezdxf.filemanagement import new
 from ezdxf.layouts.blocklayout import BlockLayout
 from ezdxf.layouts.layout import Modelspace
 from ezdxf.render.forms import cube
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.io.importing import ImportOptions, SiteImport, import_site
@@ -255,7 +255,6 @@ def imported(town: Town, folder: Path) -> SiteImport:
 
 
 @given(towns())
-@settings(deadline=None, derandomize=True)
 def test_every_entity_has_its_fate_and_every_building_its_solid(
     tmp_path_factory: pytest.TempPathFactory, town: Town
 ) -> None:

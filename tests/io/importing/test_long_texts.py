@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
@@ -73,7 +73,6 @@ def is_short(message: str) -> bool:
     return len(message) <= MOST_MESSAGE and "W" * 101 not in message  # a title has 100
 
 
-@settings(max_examples=60)
 @example(".geojson", 0, {})
 @given(st.sampled_from(sorted(TEXTS)), st.integers(0, 5_000), st.sampled_from(ASKED))
 def test_messages_stay_short(suffix: str, number: int, asked: Mapping[str, Any]) -> None:

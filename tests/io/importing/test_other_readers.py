@@ -17,7 +17,7 @@ import shapely
 from ezdxf.disassemble import recursive_decompose
 from ezdxf.filemanagement import new, readfile
 from ezdxf.render.mesh import MeshBuilder
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod, Transformer
 from shapely.affinity import rotate, scale, translate
@@ -88,7 +88,6 @@ BESIDE = (CORNER[0] + 20.0, CORNER[1] - 30.0)
 
 
 @given(DRAWN)
-@settings(deadline=None, derandomize=True, max_examples=15)
 def test_buildings_of_geojson_are_those_of_shapely(
     tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple[BaseGeometry, dict[str, str]]]
 ) -> None:
@@ -104,7 +103,6 @@ def test_buildings_of_geojson_are_those_of_shapely(
 
 
 @given(DRAWN)
-@settings(deadline=None, derandomize=True, max_examples=15)
 def test_buildings_of_an_extract_are_those_of_osmium(
     tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple[BaseGeometry, dict[str, str]]]
 ) -> None:
@@ -174,7 +172,6 @@ def solid_of(corners: np.ndarray[Any, Any], faces: list[list[int]]) -> Solid:
 
 
 @given(DRAWN, st.data())
-@settings(deadline=None, derandomize=True, max_examples=15)
 def test_buildings_of_a_drawing_are_those_of_ezdxf(
     tmp_path_factory: pytest.TempPathFactory,
     drawn: list[tuple[BaseGeometry, dict[str, str]]],
@@ -259,7 +256,6 @@ def solids_of_ezdxf(path: Path, unit: float) -> Iterator[Solid]:
 
 
 @given(DRAWN, st.data())
-@settings(deadline=None, derandomize=True, max_examples=15)
 def test_buildings_of_a_model_are_those_of_ifcopenshell(
     tmp_path_factory: pytest.TempPathFactory,
     drawn: list[tuple[BaseGeometry, dict[str, str]]],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -20,7 +20,6 @@ MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 
 
 @given(MASKS)
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_rectangles_are_the_cells_and_none_is_hidden_by_others(cells: np.ndarray) -> None:
     """Two of four walls are open, so that no part of a building alone is without a load."""
     framed, count = np.pad(cells, 1), np.zeros(cells.shape, dtype=int)
@@ -53,7 +52,6 @@ def test_common_footprints_take_few_rectangles(rows: list[str], count: int) -> N
 
 
 @given(st.floats(0.0, 90.0), st.floats(2.0, 6.0), st.floats(2.0, 6.0))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_modules_lie_with_their_centres_in_the_outline(
     angle: float, width: float, height: float
 ) -> None:
@@ -87,7 +85,6 @@ def test_coarser_blocks_are_whole() -> None:
 
 
 @given(st.floats(-44.0, 44.0))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_direction_is_that_of_most_walls(angle: float) -> None:
     houses = [shapely.box(0, 0, 20, 10), shapely.box(30, 0, 40, 8)]
     askew = shapely.affinity.rotate(shapely.box(60, 0, 75, 12), 31.0)
@@ -101,7 +98,6 @@ def test_walls_a_little_askew_do_not_pull_the_direction_away() -> None:
 
 
 @given(st.floats(0.0, 0.49), st.floats(0.0, 0.49))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_grid_lies_where_most_walls_are(x: float, y: float) -> None:
     long = shapely.box(10.0 + x, 20.0 + y, 30.0 + x, 30.0 + y)
     short = shapely.box(0.3, 0.2, 2.55, 3.45)

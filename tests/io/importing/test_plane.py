@@ -16,7 +16,6 @@ EARTH = Geod(ellps="WGS84")
 @given(
     st.floats(-179.0, 179.0), st.floats(-80.0, 80.0), st.floats(-2000, 2000), st.floats(-2000, 2000)
 )
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_metres_are_those_of_the_earth(lon: float, lat: float, x: float, y: float) -> None:
     plane = LocalPlane.around("EPSG:4326", (lon, lat))
     (place,) = plane.to_source(np.array([[x, y]]))
@@ -35,7 +34,7 @@ def test_mercator_s_metres_are_not_taken_for_metres() -> None:
 
 
 @given(st.floats(-180.0, 180.0), st.floats(-1500, 1500), st.floats(-1500, 1500))
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8)
 def test_site_lies_where_its_georeference_says(angle: float, x: float, y: float) -> None:
     """Also a corner far from the place around which the map was measured: north turns a little."""
     plane = LocalPlane.around("EPSG:25832", _utm(7.5, 54.8))

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.io.importing import ImportOptions, SiteImport, import_site
@@ -172,7 +172,6 @@ def imported(model: Model, folder: Path) -> SiteImport:
 
 
 @given(models())
-@settings(deadline=None, derandomize=True)
 def test_every_element_has_its_fate_and_every_building_its_solid(
     tmp_path_factory: pytest.TempPathFactory, model: Model
 ) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import shapely
 from ezdxf import units
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, named
@@ -684,7 +684,6 @@ def shaped(shape: tuple[str | None, int, int, int], tags: dict[str, str]) -> dic
 
 
 @given(st.lists(st.tuples(SHAPES, KINDS), max_size=12), st.booleans())
-@settings(max_examples=40, deadline=None, derandomize=True)
 def test_every_object_is_on_the_ledger_or_on_the_site(
     tmp_path_factory: pytest.TempPathFactory,
     drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
@@ -782,7 +781,6 @@ def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> 
 
 
 @given(st.lists(st.tuples(SHAPES, KINDS), max_size=10))
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_every_way_of_an_extract_is_on_the_ledger(
     tmp_path_factory: pytest.TempPathFactory,
     drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
@@ -812,7 +810,6 @@ def test_every_way_of_an_extract_is_on_the_ledger(
         max_size=10,
     )
 )
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_every_entity_of_a_drawing_is_on_the_ledger(
     tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple[str, int, int, int, str]]
 ) -> None:

@@ -7,7 +7,7 @@ format.
 from collections.abc import Mapping
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
@@ -66,7 +66,6 @@ def options_of(town: Town, metres: float) -> ImportOptions:
 
 
 @given(towns(without_shape()))
-@settings(deadline=None, derandomize=True)
 def test_every_object_of_geojson_has_its_fate(
     tmp_path_factory: pytest.TempPathFactory, town: Town
 ) -> None:
@@ -75,7 +74,6 @@ def test_every_object_of_geojson_has_its_fate(
 
 
 @given(towns(incomplete()))
-@settings(deadline=None, derandomize=True)
 def test_every_object_of_an_extract_has_its_fate(
     tmp_path_factory: pytest.TempPathFactory, town: Town
 ) -> None:
