@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +18,7 @@ from typer.testing import CliRunner
 
 from blast_env.answers import assess, compare
 from blast_env.answers.document import Document, Line, Number, Table
-from blast_env.answers.report import Report, StudyOptions, report_document, summary
+from blast_env.answers.report import Report, StudyOptions, basis, report_document, summary
 from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
@@ -29,12 +30,12 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.questions.grid_error import impulse_of
 from blast_env.evaluation.questions.probability import level_probability
-from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.evaluation.questions.verdict import Consequences, consequences_of, other_glazing
 from blast_env.evaluation.study import Study, run_study
 from blast_env.gas import Cells
 from blast_env.geometry import Layout
 from blast_env.layout import write_layout
-from blast_env.response import LevelOfProtection
+from blast_env.response import Glazing, LevelOfProtection
 from blast_env.site import Charge, PointSource, Scenario, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.blasts import soon_growing_cells
@@ -53,13 +54,19 @@ GLASS, WALL = "window_laminated_6", "concrete_200"
 def _quick() -> Iterator[None]:
     """Leave figures empty, draw few of the uncertain quantities, and let cells grow soon.
 
-    No probability is compared, and one road serves all cells.
+    One road serves all cells, as it does all draws, bays and glass.
     """
-    few = partial(level_probability, draws=20)
+    few = partial(level_probability, draws=5, deciding=1)
     with undrawn_figures(), soon_growing_cells(), pytest.MonkeyPatch.context() as patch:
         for module in (assess, compare, summary):
             patch.setattr(module, "level_probability", lambda judged, known, *_: few(judged, known))
+        for module in (assess, basis):
+            patch.setattr(module, "other_glazing", _first_other_glazing)
         yield
+
+
+def _first_other_glazing(scenario: Scenario) -> dict[str, Glazing]:
+    return dict(islice(other_glazing(scenario).items(), 1))
 
 
 def test_these_are_all_sites_with_heights() -> None:

@@ -13,8 +13,8 @@ from tests.figures import undrawn_package as undrawn_package
 
 @pytest.fixture(scope="package", autouse=True)
 def _probabilities_of_few_draws() -> Iterator[None]:
-    """Draw a tenth of what commands draw."""
+    """Draw a fiftieth of what commands draw."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (advised, assess):
-            patch.setattr(module, "level_probability", partial(level_probability, draws=100))
+            patch.setattr(module, "level_probability", partial(level_probability, draws=20))
         yield

@@ -99,7 +99,7 @@ def test_a_raised_charge_keeps_the_ground() -> None:
         assert gas < peaks[0] / peaks[1] < 1.6
 
 
-@settings(max_examples=8)  # of 400 heights
+@settings(max_examples=4)  # of 400 heights
 @given(st.sampled_from(["overpressure", "impulse"]), st.floats(5.0, 30.0), st.floats(0.0, 6.0))
 def test_loads_do_not_jump_with_the_height(load: Load, away_m: float, up_m: float) -> None:
     heights_m = np.append(0.0, np.geomspace(1e-6, 3.0, 400))

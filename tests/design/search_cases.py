@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from blast_env import load_scenario
 from blast_env.design.search import DesignProblem, Layout
 from blast_env.errors import LayoutError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, BlastLoads, BlastStore, LoadCase, LoadCaseSet
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
@@ -33,11 +34,17 @@ def ballistic(name: str) -> Scenario:
     return Scenario.from_document(document, name)
 
 
+@cache
+def known_blasts() -> BlastStore:
+    """Return one store for all tests: the same blasts come again and again."""
+    return BlastStore.of(None, 10_000)
+
+
 def small_problem(
     evaluator: BlastEvaluator | None = None, realisations: int = 2, processes: int = 1
 ) -> DesignProblem:
     """Return the problem of the small site's own charge: 299 layouts, 598 blasts."""
-    evaluator = evaluator or BlastEvaluator(small_scenario(), "event")
+    evaluator = evaluator or BlastEvaluator(small_scenario(), "event", cache=known_blasts())
     charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
     seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
     threats = tuple(LoadCase(charge, seed) for seed in seeds.tolist())
@@ -64,7 +71,7 @@ class WatchedEvaluator(BlastEvaluator):
     def __init__(
         self, scenario: Scenario, watch: Callable[[list[tuple[Layout, LoadCase]]], None]
     ) -> None:
-        super().__init__(scenario, "event")
+        super().__init__(scenario, "event", cache=known_blasts())
         self._watch = watch
 
     def loads_of_many(

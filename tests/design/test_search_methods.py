@@ -94,7 +94,7 @@ def test_the_seed_decides_everything(name: str, problem: DesignProblem) -> None:
 
 
 def test_the_number_of_processes_changes_nothing(problem: DesignProblem) -> None:
-    fresh = small_problem(processes=2)
+    fresh = small_problem(BlastEvaluator(small_scenario(), "event"), processes=2)
     assert GeneticSearch().propose(fresh, 24, 1) == GeneticSearch().propose(problem, 24, 1)
 
 

@@ -13,11 +13,13 @@ from gymnasium.wrappers import HumanRendering, RecordVideo
 import blast_env  # noqa: F401  # registers
 from tests.envs.small import make, play
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("drawn")]
+pytestmark = pytest.mark.slow
+drawn = pytest.mark.usefixtures("drawn")
 
 FINISH = 40
 
 
+@drawn
 def test_frames_are_of_one_size_from_the_first_module_to_the_blast() -> None:
     env = make(render_mode="rgb_array")
     env.reset(seed=1)
@@ -56,6 +58,7 @@ def _finishing() -> gym.Env:
     return gym.make("BlastBarrier-v0", render_mode="rgb_array", realisations=1)
 
 
+@drawn
 def test_the_last_frame_stays_and_does_not_leak_into_the_next_episode() -> None:
     env = make(render_mode="rgb_array")
     env.reset(seed=1)
@@ -103,6 +106,7 @@ def test_the_text_tells_impulse_and_reduction_at_the_end() -> None:
     assert values[2] == pytest.approx(expected[2], abs=0.5)
 
 
+@drawn
 def test_the_map_of_a_hidden_charge_does_not_depend_on_the_charges_drawn() -> None:
     for mode in ("ansi", "rgb_array"):
         env = make(render_mode=mode, threat="hidden", threats=2)
@@ -113,6 +117,7 @@ def test_the_map_of_a_hidden_charge_does_not_depend_on_the_charges_drawn() -> No
         assert (pictures[0] == pictures[1]).all()
 
 
+@drawn
 def test_the_window_shows_placing_and_the_blast(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("blast_env.plots.window.pygame.time.Clock", _HurriedClock)
     env = make(render_mode="human")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine, simulate
@@ -16,7 +16,7 @@ from tests.builders import block, point, site
 from tests.particles.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, step_s, wall
 
 
-def fan_scene(distance: float, count: int = 720, facade: float = 20.0) -> Scene:
+def fan_scene(distance: float, count: int = 360, facade: float = 20.0) -> Scene:
     """A charge without air in front of a facade, far from its other sides."""
     of_parameters = parameters(explosive={"ball_count": count, "radius_units": 0.05})
     fan = explosion_fan(of_parameters.explosive, (50.0, 100.0), np.random.default_rng(0))
@@ -27,7 +27,7 @@ def fan_scene(distance: float, count: int = 720, facade: float = 20.0) -> Scene:
 @pytest.mark.parametrize("distance", [20.0, 80.0])
 def test_hits_without_air_equal_the_view_factor(engine: ParticleEngine, distance: float) -> None:
     """The share of the fan that the facade covers, as seen from the charge."""
-    count, facade, radius = 720, 20.0, 0.05
+    count, facade, radius = 360, 20.0, 0.05
     angle = 2.0 * np.arctan((facade / 2 + radius) / distance)
     expected = count * angle / (2.0 * np.pi)
     assert abs(len(finished(fan_scene(distance), engine).log) - expected) <= 1.0
@@ -59,7 +59,6 @@ def test_a_bare_centred_lattice_is_the_same_for_every_seed_and_symmetric() -> No
 
 
 @given(st.integers(0, 2**31), st.floats(2.0, 20.0), st.floats(30.0, 200.0))
-@settings(max_examples=50, deadline=None, derandomize=True)
 def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, width: float) -> None:
     air, site = parameters(air={"spacing_units": spacing}).air, Rectangle(0.0, 0.0, width, 50.0)
     rng = np.random.default_rng(seed)
@@ -77,7 +76,6 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
     restitution=st.floats(0.0, 1.0),
     step_radii=st.floats(0.1, 0.5),
 )
-@settings(max_examples=15, deadline=None, derandomize=True)
 def test_nothing_tunnels_through_a_module_or_the_border(
     engine_name: str,
     kind: CollisionType,
