@@ -26,7 +26,7 @@ class _Commands(LazyGroup):
         "train": ("Train an agent that proposes layouts, or resume an interrupted training."),
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
-        "import": "Make a scenario from a map, drawing or model: GeoJSON, OpenStreetMap, DXF, IFC.",
+        "import": "Make a scenario from a map, drawing or model: GeoJSON, IFC and others.",
         "app": (
             "Open a local web page to design on: draw a site, place barriers, blast, compare, "
             "search."

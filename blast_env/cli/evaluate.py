@@ -76,8 +76,8 @@ def evaluate(
     ),
     export: Path | None = typer.Option(
         None,
-        help="Folder for the layout as JSON, CSV, GeoJSON and DXF; or a file with one of these "
-        "suffixes.",
+        help="Folder for the layout as JSON, CSV, GeoJSON, DXF and glTF; or a file with one of "
+        "their suffixes, or .ifc.",
         callback=_note_export,
     ),
     out: Path | None = writes("Folder for the JSON file, the tables and the figure"),

@@ -124,7 +124,7 @@ def import_map(
         False, "--strict", help="Refuse a file where anything was guessed or left out."
     ),
 ) -> None:
-    """Make a scenario from a map, drawing or model: GeoJSON, CityJSON, OpenStreetMap, DXF, IFC.
+    """Make a scenario from a map, drawing or model: GeoJSON, IFC and others.
 
     The site is turned to the direction of most walls, and buildings are polygons; the table gives
     the deviation of the modules of each building from its outline.

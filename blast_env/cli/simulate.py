@@ -8,7 +8,7 @@ import typer
 
 from blast_env.answers.simulate import blast_answer, blast_record
 from blast_env.answers.terminal import print_line
-from blast_env.cli.command import PICTURES, writes
+from blast_env.cli.command import PICTURES, Target, note_target, writes
 from blast_env.cli.options import (
     UNTIL_HELP,
     CellOption,
@@ -26,6 +26,7 @@ from blast_env.cli.output import print_outcome, print_record, progress_bar
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Layout
+from blast_env.io.export import BLAST_SUFFIXES, blast_recorders, check_blast_target, export_blast
 from blast_env.layout import load_layout
 from blast_env.layout.build_site import draw_threat
 from blast_env.plots.blast_files import BlastFiles
@@ -33,6 +34,14 @@ from blast_env.site import load_scenario
 
 _GAS: Final = "Gas dynamics only"
 _PARTICLES: Final = "Particles only"
+
+
+def _note_export(context: typer.Context, value: Path | None) -> Path | None:
+    """Add the target of `--export`, a file or a folder; `check_blast_target` checks others."""
+    if value is not None:
+        is_one = value.suffix.lower() in BLAST_SUFFIXES and not value.is_dir()
+        note_target(context, Target("--export", value, BLAST_SUFFIXES if is_one else ()))
+    return value
 
 
 def simulate(
@@ -68,6 +77,13 @@ def simulate(
     ),
     risk_map: Path | None = writes(
         "Write a map of where windows and eardrums are at risk", *PICTURES, panel=_GAS
+    ),
+    export: Path | None = typer.Option(
+        None,
+        help="Folder for the scene with loads as glTF, the histories as CSV and the field of "
+        "pressure for ParaView; or a file with one of these suffixes: .glb, .csv, .vti.",
+        callback=_note_export,
+        rich_help_panel=_GAS,
     ),
     quantity: str | None = typer.Option(
         None,
@@ -105,7 +121,11 @@ def simulate(
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
-    files = BlastFiles(**{field.name: context.params[field.name] for field in fields(BlastFiles)})
+    names = [field.name for field in fields(BlastFiles) if field.name in context.params]
+    files = BlastFiles(**{name: context.params[name] for name in names})
+    if export is not None:
+        check_blast_target(export)  # before the blast, so that it is not lost
+        files = replace(files, further=blast_recorders(export))
     fixed = given.fixed(site, draw_threat(site, seed))
     blast: Any = used.blast(site, elements, seed, fixed)
     files.check(blast)
@@ -116,6 +136,8 @@ def simulate(
     if excel is not None:
         written.append(result.to_excel(excel))
     written += files.draw(results)
+    if export is not None:
+        written += export_blast(result, export)
     if as_json:
         print_record(blast_record(result), written)
         return

@@ -338,6 +338,47 @@ class GroundMap:
         return np.where(self._solid, np.nan, values.astype(np.float64))
 
 
+class FieldMap:
+    """Recorder of the peak overpressure and the peak specific impulse in all cells.
+
+    Args:
+        grid: The grid.
+    """
+
+    def __init__(self, grid: GasGrid) -> None:
+        self._peak = np.zeros(grid.shape, dtype=np.float32)
+        self._net = np.zeros(grid.shape, dtype=np.float32)
+        self._impulse = np.zeros(grid.shape, dtype=np.float32)
+        self._now = np.zeros(grid.shape, dtype=np.float32)
+
+    def record(self, solver: Gas, step_s: float) -> None:
+        """Add a step, layer by layer: one layer is in the cache."""
+        for layer in range(self._peak.shape[2]):
+            over = solver.overpressure_in(2, layer).astype(np.float32)
+            peak, net, largest = (
+                values[:, :, layer] for values in (self._peak, self._net, self._impulse)
+            )
+            np.maximum(peak, over, out=peak)
+            net += np.float32(0.5 * step_s) * (over + self._now[:, :, layer])
+            np.maximum(largest, net, out=largest)
+            self._now[:, :, layer] = over
+
+    @property
+    def peak_pa(self) -> NDArray[np.float32]:
+        """Largest overpressures, Pa (nx, ny, nz); those in solid cells mean nothing."""
+        return self._peak
+
+    @property
+    def impulse_pa_s(self) -> NDArray[np.float32]:
+        """Peak specific impulses, Pa s (nx, ny, nz)."""
+        return self._impulse
+
+    @property
+    def overpressure_pa(self) -> NDArray[np.float32]:
+        """Overpressures at the last step, Pa (nx, ny, nz)."""
+        return self._now
+
+
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """Overpressure in a plane at a time.

@@ -28,6 +28,7 @@ class BlastFiles:
         risk_map: Risks to windows and eardrums.
         quantity: Quantity of the heat map by gas dynamics: impulse, unless peak.
         gauge: Gauge of the history; by default the scenario's first.
+        further: What else records the blast, by gas dynamics.
     """
 
     film: Path | None = None
@@ -38,6 +39,7 @@ class BlastFiles:
     risk_map: Path | None = None
     quantity: str | None = None
     gauge: str | None = None
+    further: "Recorders | None" = None
 
     def check(self, blast: "Blast | GasBlast") -> None:
         """Refuse files that cannot be made, before the blast.
@@ -136,12 +138,13 @@ class BlastFiles:
         return [save_figure(draw(), path) for path, draw in pictures if path is not None]
 
     def _recorders(self) -> "Recorders":
-        """Return the recorders of the ground, if a map of it is wanted."""
-        if not any((self.impulse_map, self.peak_map, self.risk_map)):
-            return lambda _: ()
-        from blast_env.plots.ground_map import ground_recorders
+        """Return the recorders of the ground, if a map of it is wanted, and further ones."""
+        found = [] if self.further is None else [self.further]
+        if any((self.impulse_map, self.peak_map, self.risk_map)):
+            from blast_env.plots.ground_map import ground_recorders
 
-        return ground_recorders
+            found.append(ground_recorders)
+        return lambda grid: tuple(recorder for made in found for recorder in made(grid))
 
 
 def _named(path: Path, number: int) -> Path:

@@ -1,4 +1,4 @@
-"""Layouts as files for other programs: JSON, CSV, GeoJSON and DXF."""
+"""Layouts and blasts as files for other programs, such as DXF, IFC and glTF."""
 
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,14 @@ if TYPE_CHECKING:
         LayoutPlan,
         bill_of_quantities,
         element_table,
+    )
+    from blast_env.io.export.blast import (
+        BLAST_SUFFIXES,
+        HISTORY_COLUMNS,
+        blast_recorders,
+        check_blast_target,
+        export_blast,
+        history_table,
     )
     from blast_env.io.export.dxf import clearance_outlines, drawing, key_of, note_lines, texts_of
     from blast_env.io.export.files import (
@@ -26,17 +34,23 @@ else:
 
 __all__ = [
     "BILL_COLUMNS",
+    "BLAST_SUFFIXES",
+    "HISTORY_COLUMNS",
     "PIECE_COLUMNS",
     "SUFFIXES",
     "LayoutPlan",
     "bill_of_quantities",
+    "blast_recorders",
+    "check_blast_target",
     "check_target",
     "clearance_outlines",
     "drawing",
     "element_table",
+    "export_blast",
     "export_layout",
     "export_to",
     "feature_collection",
+    "history_table",
     "is_file",
     "key_of",
     "note_lines",

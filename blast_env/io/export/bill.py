@@ -6,11 +6,12 @@ from functools import cached_property
 from math import fsum, nan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from blast_env.geometry import Element, Layout, Piece
+from blast_env.geometry import Element, Layout, Piece, Rectangle
 from blast_env.layout import LayoutState, check_layout
 from blast_env.plots.plan import Feature, rounded_m, site_features
 from blast_env.site import Scenario, find_scenario
 from blast_env.site.blast_site import Charge, module_name
+from blast_env.site.catalogue import Variant
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M
 
@@ -92,16 +93,39 @@ def element_table(plan: LayoutPlan) -> "pd.DataFrame":
     return table_of(list(_element_rows(plan)), PIECE_COLUMNS)
 
 
-def _element_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
+class PlacedElement(NamedTuple):
+    """A module or piece at its place.
+
+    Attributes:
+        name: Its name.
+        element: The element of the layout.
+        variant: Its variant.
+        rectangle_m: Its plan.
+        cost: Its cost there.
+    """
+
+    name: str
+    element: Element
+    variant: Variant
+    rectangle_m: Rectangle
+    cost: float
+
+
+def placed_elements(plan: LayoutPlan) -> Iterator[PlacedElement]:
+    """Yield the modules and pieces of a layout in its order, without measures of hardening."""
+    zone = plan.scenario.zone
     for element, cost in _with_costs(plan):
-        zone = plan.scenario.zone
         variant = zone.catalogue.variant(element)
-        if variant.is_measure:
-            continue  # it is in the bill
-        rectangle = zone.element_rectangle_m(element)
-        name = module_name(*rectangle.centre)
-        if isinstance(element, Piece):
-            name = zone.piece_name(element)
+        if not variant.is_measure:
+            rectangle_m = zone.element_rectangle_m(element)
+            name = module_name(*rectangle_m.centre)
+            if isinstance(element, Piece):
+                name = zone.piece_name(element)
+            yield PlacedElement(name, element, variant, rectangle_m, cost)
+
+
+def _element_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
+    for name, element, variant, rectangle, cost in placed_elements(plan):
         corner_x_m, corner_y_m = rounded_m(rectangle.left, rectangle.bottom)
         centre_x_m, centre_y_m = rounded_m(*rectangle.centre)
         sides = (

@@ -1,4 +1,4 @@
-"""Layouts as CSV, GeoJSON, DXF and JSON."""
+"""Layouts as CSV, GeoJSON, DXF, IFC, glTF and JSON."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -133,6 +133,18 @@ def _write_dxf(plan: LayoutPlan, path: Path) -> None:
     write_dxf(plan, path)
 
 
+def _write_ifc(plan: LayoutPlan, path: Path) -> None:
+    from blast_env.io.export.ifc import write_ifc  # it needs the extra `ifc`
+
+    write_ifc(plan, path)
+
+
+def _write_glb(plan: LayoutPlan, path: Path) -> None:
+    from blast_env.io.export.scene import write_layout_scene
+
+    write_layout_scene(plan, path)
+
+
 _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], object]]] = MappingProxyType(
     {
         ".json": _write_json,
@@ -140,8 +152,16 @@ _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], object]]] = MappingPro
         ".bill.csv": lambda plan, path: write_csv(bill_of_quantities(plan), path),
         ".geojson": write_geojson,
         ".dxf": _write_dxf,
+        ".glb": _write_glb,
+        ".ifc": _write_ifc,
     }
 )
+_NEEDS: Final[Mapping[str, str]] = MappingProxyType({".dxf": "dxf", ".ifc": "ifc"})
+"""Modules with packages of an extra, whose error names it."""
+
+_ALONE: Final = ".ifc"
+"""The format that a folder gets only where it is asked for by its suffix: its extra is large."""
+
 
 SUFFIXES: Final = tuple(_WRITERS)
 """Suffixes of the formats of a layout."""
@@ -153,8 +173,8 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
     Args:
         plan: The layout on its site.
         path: `.json` (a layout file), `.csv` (the modules or pieces), `.bill.csv` (the bill of
-            quantities), `.geojson` or `.dxf` (everything on the site); an existing
-            file is replaced as a whole.
+            quantities), `.geojson`, `.dxf` or `.glb` (everything on the site), `.ifc` (the pieces
+            as walls); an existing file is replaced as a whole.
 
     Returns:
         The path.
@@ -173,7 +193,7 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
 
 
 def export_to(plan: LayoutPlan, target: str | Path) -> list[Path]:
-    """Write a layout to a file, or to a folder in all formats.
+    """Write a layout to a file, or to a folder in all formats but IFC.
 
     Args:
         plan: The layout on its site.
@@ -190,7 +210,8 @@ def export_to(plan: LayoutPlan, target: str | Path) -> list[Path]:
     if is_file(target):
         return [export_layout(plan, target)]
     make_folder(target)
-    return [export_layout(plan, target / f"layout{suffix}") for suffix in SUFFIXES]
+    suffixes = [suffix for suffix in SUFFIXES if suffix != _ALONE]
+    return [export_layout(plan, target / f"layout{suffix}") for suffix in suffixes]
 
 
 def check_target(target: str | Path) -> None:
@@ -206,8 +227,9 @@ def check_target(target: str | Path) -> None:
             f"{target}: suffix is {suffix!r}{suggestion(suffix, SUFFIXES)}, must be "
             f"{_named_suffixes()}, or nothing for a folder"
         )
-    if suffix == ".dxf" or not is_file(target):
-        import_module("blast_env.io.export.dxf")  # its error names the missing extra
+    needed = _NEEDS.get(suffix) if is_file(target) else _NEEDS[".dxf"]
+    if needed is not None:
+        import_module(f"blast_env.io.export.{needed}")  # its error names the missing extra
 
 
 def is_file(target: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Sites from maps and drawings: GeoJSON, OpenStreetMap, DXF, IFC."""
+"""Sites from maps, drawings and models: GeoJSON, OpenStreetMap, DXF, IFC, CityJSON and others."""
 
 from typing import TYPE_CHECKING, Final
 
@@ -6,7 +6,13 @@ from blast_env.io.importing.ledger import FATES, MOST_LETTERS, Fate, Ledger, Led
 from blast_env.io.importing.options import ImportOptions
 
 if TYPE_CHECKING:
-    from blast_env.io.importing.convert import SiteImport, import_site, read_map, sketch_of
+    from blast_env.io.importing.convert import (
+        SUFFIXES,
+        SiteImport,
+        import_site,
+        read_map,
+        sketch_of,
+    )
     from blast_env.io.importing.fitting import BuildingFit, Deviation
     from blast_env.io.importing.ground import cells_of, in_blocks
     from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
@@ -16,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "FATES",
     "MOST_LETTERS",
+    "SUFFIXES",
     "BuildingFit",
     "Deviation",
     "Fate",
@@ -36,7 +43,7 @@ __all__ = [
     "to_map",
 ]
 
-_CONVERT: Final = frozenset({"SiteImport", "import_site", "read_map", "sketch_of"})
+_CONVERT: Final = frozenset({"SUFFIXES", "SiteImport", "import_site", "read_map", "sketch_of"})
 _FITTING: Final = frozenset({"Deviation", "BuildingFit"})
 _GROUND: Final = frozenset({"cells_of", "in_blocks"})
 _OUTLINES: Final = frozenset({"dominant_direction_deg", "grid_offset_m"})

@@ -219,6 +219,9 @@ _READERS: Final[Mapping[str, Callable[[SiteMap], None]]] = MappingProxyType(
     }
 )
 
+SUFFIXES: Final = tuple(_READERS)
+"""Suffixes of the formats that are read; the first that ends a file's name counts."""
+
 
 def read_map(path: Path, options: ImportOptions) -> SiteMap:
     """Return the map of a file, read by its suffix.
