@@ -308,9 +308,15 @@ Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 def box_distances_m(box: Rectangle, boxes: Boxes) -> FloatArray:
     """Return the distances between one rectangle and others, m; 0 if they overlap."""
-    left, bottom, right, top = boxes
-    along_x = np.maximum(0.0, np.maximum(left - box.right, box.left - right))
-    along_y = np.maximum(0.0, np.maximum(bottom - box.top, box.bottom - top))
+    left, bottom, right, top = map(np.asarray, box)
+    return distances_between_m((left, bottom, right, top), boxes)
+
+
+def distances_between_m(some: Boxes, others: Boxes) -> FloatArray:
+    """Return the distances between rectangles, m, which broadcast; 0 where they overlap."""
+    left, bottom, right, top = others
+    along_x = np.maximum(0.0, np.maximum(left - some[2], some[0] - right))
+    along_y = np.maximum(0.0, np.maximum(bottom - some[3], some[1] - top))
     distances_m: FloatArray = np.hypot(along_x, along_y)
     return distances_m
 

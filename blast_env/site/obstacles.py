@@ -26,8 +26,9 @@ def obstacles_of(
     solid: list[Rectangle] = []
     rated: list[CrashPiece] = []
     for element in sorted(standing(layout)):
-        variant, rectangle = zone.catalogue.variant(element), zone.element_rectangle_m(element)
-        if ground_below_m(terraces, rectangle) > 0.0:
+        variant, (row, column) = zone.catalogue.variant(element), element[:2]
+        rectangle = zone.cells_rectangle_m(row, column, variant.rows, variant.columns)
+        if terraces and ground_below_m(terraces, rectangle) > 0.0:
             continue
         if variant.crash_rating is not None:
             rated.append(CrashPiece(rectangle, variant.crash_rating, element_text(element)))

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle, WallLine, box_distances_m
+from blast_env.geometry import Rectangle, WallLine, distances_between_m
 from blast_env.sections import PointM
 from blast_env.vehicles.vehicle import Vehicle
 
@@ -61,8 +61,7 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
     """
     from blast_env.vehicles.worst_kernels import chosen_places  # Numba takes long to import
 
-    distances_m = np.array([_distances_m(wall, places_m) for wall in walls])
-    distances_m = distances_m.reshape(len(walls), len(places_m))
+    distances_m = _distances_m(walls, places_m)
     middles_m = [(wall.bounds_m if isinstance(wall, WallLine) else wall).centre for wall in walls]
     chosen = chosen_places(
         np.ascontiguousarray(places_m),
@@ -84,9 +83,7 @@ def stand_off_m(walls: Iterable[Wall], position_m: PointM) -> float:
 
 def least_distances_m(walls: Iterable[Wall], places_m: FloatArray) -> FloatArray:
     """Return the distances of places (places, 2) from the nearest loaded wall, m (places,)."""
-    nearest_m = np.full(len(places_m), np.inf)
-    for wall in walls:
-        np.minimum(nearest_m, _distances_m(wall, places_m), out=nearest_m)
+    nearest_m: FloatArray = _distances_m(tuple(walls), places_m).min(axis=0, initial=np.inf)
     return nearest_m
 
 
@@ -109,9 +106,14 @@ def _nearest_m(wall: Wall, place_m: PointM) -> PointM:
     return min(max(place_m[0], left), right), min(max(place_m[1], bottom), top)
 
 
-def _distances_m(wall: Wall, places_m: FloatArray) -> FloatArray:
-    """Return the distances of places (places, 2) from a wall, m (places,)."""
-    if isinstance(wall, WallLine):
-        return wall.distances_m(places_m)
+def _distances_m(walls: Sequence[Wall], places_m: FloatArray) -> FloatArray:
+    """Return the distances of places (places, 2) from walls, m (walls, places)."""
+    found = np.empty((len(walls), len(places_m)))
+    boxes_m = {k: wall for k, wall in enumerate(walls) if not isinstance(wall, WallLine)}
+    left, bottom, right, top = np.array([*boxes_m.values()]).reshape(-1, 4).T[..., np.newaxis]
     x_m, y_m = np.ascontiguousarray(places_m.T)
-    return box_distances_m(wall, (x_m, y_m, x_m, y_m))
+    found[[*boxes_m]] = distances_between_m((left, bottom, right, top), (x_m, y_m, x_m, y_m))
+    for own, wall in zip(found, walls, strict=True):
+        if isinstance(wall, WallLine):
+            own[:] = wall.distances_m(places_m)
+    return found
