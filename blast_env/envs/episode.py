@@ -553,9 +553,13 @@ class Episodes:
             BlastEnvError: If the terms differ from those that the reward names.
         """
         chosen = np.asarray(indices)
-        has_effect = self._repeated[chosen] == _NO_ACTION
-        self.terms[chosen, :-1] = self._paid(chosen)
-        self.terms[chosen, -1] = np.where(has_effect, 0.0, -self.task.illegal.cost)
+        self.terms[chosen] = 0.0
+        paid = chosen if self._of_turns else chosen[self._begins[chosen] | self.ended[chosen]]
+        if len(paid):
+            self.terms[paid, :-1] = self._paid(paid)
+        without_effect = chosen[self._repeated[chosen] != _NO_ACTION]
+        if len(without_effect):
+            self.terms[without_effect, -1] = -self.task.illegal.cost
         rewards: FloatArray = np.zeros(len(chosen))
         for of_term in self.terms[chosen].T:  # one by one: the same sum of one row or of many
             rewards += of_term

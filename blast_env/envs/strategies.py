@@ -233,7 +233,10 @@ class Reward(Protocol):
 
 @runtime_checkable
 class EndReward(Protocol):
-    """A reward that follows from the reduction by the whole layout, of many turns at once."""
+    """A reward that follows from the reduction by the whole layout, of many turns at once.
+
+    It pays when an episode begins or ends, and is asked in no other turn.
+    """
 
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
         """Return the names of the terms; `invalid_actions` is reserved for the environment."""

@@ -158,17 +158,14 @@ class LayoutBatch:
 
     def _limit_to_budget(self, indices: IntArray) -> None:
         """Take away places beyond the budget, in layouts of the same rules."""
-        from blast_env.layout.batch_kernels import exact_costs, limit  # as in `place`
+        from blast_env.layout.batch_kernels import limit_to_budget  # as in `place`
 
         rules = self.rules[indices[0]]
         if rules.zone.budget is None:
             return
-        spent = exact_costs(indices, self._numbers, self.placed, rules.costs)  # in any order
-        self.budget_left[indices] = np.maximum(0.0, rules.zone.budget - spent)
-        spendable = rules.zone.cost_limit - spent
-        short = spendable < rules.dearest
-        if short.any():
-            limit(indices[short], spendable[short], rules.costs, self.legal)
+        layouts = indices, self._numbers, self.placed, self.budget_left, self.legal
+        limits = rules.zone.budget, rules.zone.cost_limit, rules.dearest
+        limit_to_budget(*layouts, rules.costs, *limits)
 
     def _keep_open(self, indices: IntArray) -> None:
         """Take away places that would close the access way, in layouts of the same rules."""

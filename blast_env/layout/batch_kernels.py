@@ -41,26 +41,17 @@ def place(
 
 
 @njit(cache=True, nogil=True)
-def limit(indices: IntArray, spendable: FloatArray, costs: FloatArray, legal: BoolArray) -> None:
-    """Take away places that cost more than what may be spent (indices,)."""
-    for position, index in enumerate(indices):
-        own, most = legal[index].reshape(-1), spendable[position]
-        for place, cost in enumerate(costs.reshape(-1)):
-            own[place] &= cost <= most
-
-
-@njit(cache=True, nogil=True)
 def find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
     """Find whether each of some layouts has no legal place left."""
     for index in indices:
         is_full[index] = not legal[index].any()
 
 
-@njit(cache=True, nogil=True)
-def exact_costs(
+@njit(nogil=True)
+def _exact_costs(
     indices: IntArray, numbers: IntArray, placed: IntArray, costs: FloatArray
 ) -> FloatArray:
-    """Return the cost of each of some layouts (indices,), as by `math.fsum`.
+    """Return the cost of each of some layouts (indices,), as by `math.fsum`, in any order.
 
     Shewchuk (1997): partial sums without common bits, from the least up, of each layout. (1) Each
     cost is added to all of them, and the rounding error of each addition is kept; (2) they are
@@ -101,3 +92,38 @@ def exact_costs(
                 total += twice
         found[position] = total
     return found
+
+
+@njit(cache=True, nogil=True)
+def limit_to_budget(
+    indices: IntArray,
+    numbers: IntArray,
+    placed: IntArray,
+    budget_left: FloatArray,
+    legal: BoolArray,
+    costs: FloatArray,
+    budget: float,
+    most: float,
+    dearest: float,
+) -> None:
+    """Take away the places of some layouts that cost more than what is left of the budget.
+
+    Args:
+        indices: The layouts.
+        numbers: Numbers of the elements of all layouts (layouts, most elements).
+        placed: Number of elements in each (layouts,).
+        budget_left: What is left of the budget, updated in place (layouts,).
+        legal: See `LayoutBatch`; updated in place.
+        costs: Cost by the element's number, in any shape.
+        budget: The budget.
+        most: The same with an allowance for rounding.
+        dearest: The largest cost at a legal place.
+    """
+    flat = costs.reshape(-1)
+    for index, spent in zip(indices, _exact_costs(indices, numbers, placed, costs)):  # noqa: B905
+        budget_left[index] = max(0.0, budget - spent)
+        spendable = most - spent
+        if spendable < dearest:
+            own = legal[index].reshape(-1)
+            for place, cost in enumerate(flat):
+                own[place] &= cost <= spendable
