@@ -18,6 +18,7 @@ from blast_env.io.importing.city_objects import CityGeometry, CityObject, Surfac
 from blast_env.io.importing.geojson import LOCAL
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.lengths import FOOT_M, UNITS_M
+from blast_env.io.importing.placing import OUTSIDE
 from blast_env.io.importing.plane import Plane, plane_around, unit_of
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags, code_of, errors_of
 
@@ -306,7 +307,10 @@ class _Model:
         """Add the parts of a building: its own body, and those of its `BuildingPart`s."""
         if self._is_far(members):
             for item in members:
-                self._add_bounds(item, self._tags(item, whole))
+                if self._chosen[item.key]:
+                    self._add_bounds(item, self._tags(item, whole))
+                else:
+                    self._map.ledger.add(Fate.PASSED, OUTSIDE, item.place)
             return
         bodies = [item for item in members if item.kind in _BODIES]
         levels = {
@@ -447,7 +451,9 @@ class _Model:
         if lines and not surfaces:
             line = shapely.MultiLineString([line[:, :2] for line in lines])
             self._map.add(MapFeature(self._in_source(line), tags, item.place))
-        elif not surfaces or not is_of_use or item.kind == _RELIEF or self._is_far([item]):
+        elif not surfaces:
+            self._map.ledger.add(Fate.PASSED, "objects without a geometry", item.place)
+        elif not is_of_use or item.kind == _RELIEF or self._is_far([item]):
             self._add_bounds(item, tags)
         else:
             for part in self._outlines(_Body(tuple(surfaces)), is_flat):
@@ -482,7 +488,8 @@ class _Model:
     def _add_bounds(self, item: CityObject, tags: Tags) -> None:
         """Add an object of no use to the site by the box around it."""
         bounds_m = self._bounds_m([item])
-        outline = _NOWHERE if bounds_m is None else self._in_source(shapely.box(*bounds_m.ravel()))
+        assert bounds_m is not None
+        outline = self._in_source(shapely.box(*bounds_m.ravel()))
         self._map.add(MapFeature(outline, tags, item.place))
 
     def _outlines(self, body: _Body, is_flat: bool) -> Iterator[BodyPart]:

@@ -244,6 +244,7 @@ def test_every_object_has_one_fate(tmp_path: Path) -> None:
     city.add("deck", "Bridge", city.geometry("MultiSurface", box(0, 24, 20, 4, 4, 5)))
     city.add("noise", "+NoiseWall", city.geometry("MultiSurface", box(0, 30, 20, 1, 0, 3)))
     city.add("gone", "Building", attributes={"conditionOfConstruction": "demolished"})
+    city.add("way", "Road", children=["street"])
     site = imported(city.write(tmp_path), charge_at=())
     fates = {entry.place: (entry.fate, entry.kind) for entry in site.ledger.of(*FATES)}
     assert {place: fate for place, (fate, _) in fates.items()} == {
@@ -255,11 +256,23 @@ def test_every_object_has_one_fate(tmp_path: Path) -> None:
         "Bridge deck": Fate.LEFT_OUT,
         "'+NoiseWall' noise": Fate.PASSED,
         "Building gone": Fate.LEFT_OUT,
+        "Road way": Fate.PASSED,
     }
     assert fates["Road street"][1] == "place of a charge"
     assert site.ledger.objects == len(city.document["CityObjects"])
     wall = imported(city.write(tmp_path), charge_at=(), buildings_from=("cityjson=Bridge",))
     assert boxes(wall) == [(80.0, 0.0, 1.0)]
+
+
+def test_what_is_far_from_the_site_asked_for_is_outside(tmp_path: Path) -> None:
+    city = town(box(0, 0, 12, 8, 0, 7))
+    city.add("whole", "Building", children=["part"])
+    far = city.geometry("Solid", box(900, 0, 12, 8, 0, 7))
+    city.add("part", "BuildingPart", far, parents=["whole"])
+    site = imported(city.write(tmp_path), centre=(X + 5.0, Y + 5.0), size_m=(40.0, 40.0))
+    fates = {entry.place: entry.kind for entry in site.ledger.of(Fate.PASSED)}
+    assert fates == dict.fromkeys(("Building whole", "BuildingPart part"), "outside the site")
+    assert site.ledger.lines((Fate.GUESSED, Fate.LEFT_OUT)) == ()
 
 
 # Coordinates.
