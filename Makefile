@@ -91,7 +91,8 @@ matrix-minari: $(STAMP) $(VENV)/.uv
 	$(BIN)/uv venv --quiet --clear --system-site-packages --python $(BIN)/python out/matrix/minari
 	$(BIN)/uv pip install --quiet --python out/matrix/minari/bin/python -e ".[all,datasets,dev]" \
 		-c constraints.txt
-	out/matrix/minari/bin/python -m pytest -rs tests/studies/test_offline_data.py
+	out/matrix/minari/bin/python -m pytest -rs tests/studies/test_offline_data.py \
+		tests/studies/test_data_card.py
 
 $(VENV)/.uv: $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt uv

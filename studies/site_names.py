@@ -53,6 +53,18 @@ def scenario_of(name: str) -> Scenario:
     return _maker(kind)(int(seed))
 
 
+def held_out_names(kind: str, count: int) -> list[str]:
+    """Return the names of the first generated sites of a kind that are held out from training.
+
+    Raises:
+        BlastEnvError: If there is no such kind, or there are fewer.
+    """
+    _maker(kind)
+    if count > HELD_OUT_SITES:
+        raise BlastEnvError(f"{kind}: count is {count}, must be at most {HELD_OUT_SITES}")
+    return [f"{kind}/{seed}" for seed in range(count)]
+
+
 def site_names(kinds: Iterable[str], first: int, count: int) -> list[str]:
     """Return the names of generated sites of the seeds of training.
 

@@ -22,6 +22,7 @@ from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved
 from blast_env.design.search.moves import Moves, random_walls
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.evaluation.engines import Engine, find_engine
@@ -32,7 +33,7 @@ from blast_env.provenance import command, versions
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import ITEM_SITES
-from blast_env.statistics import reductions
+from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate.fitting import (
     Errors,
     LoadErrors,
@@ -43,22 +44,23 @@ from blast_env.surrogate.fitting import (
     errors_of,
     fit,
     folds,
-    held_out_predictions,
     predictions,
 )
-from blast_env.surrogate.intervals import covered, interval_factor
-from blast_env.surrogate.network import Check, Fit, Surrogate, load_surrogate
+from blast_env.surrogate.intervals import covered, interval_factor, least_sites
+from blast_env.surrogate.network import Check, Fit, Networks, Surrogate, load_surrogate
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS
-from studies.site_names import scenario_of, site_names
+from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
-    Path(f"docs/data/{name}_blasts.parquet") for name in ("front_site", "close_site", "many_site")
+    Path(f"docs/data/{name}_site_blasts.parquet") for name in ("front", "close", "many", "kerb")
 )
 """Training data of the packaged surrogate: blasts on generated sites."""
 
-_FOLDS: Final = 5
+_HALVES: Final = 2
+"""Parts of the held-out sites: the factor of each is set on the other."""
+
 _EVERY: Final = 10
 _STRIDE: Final = 4000
 """Between the held-out seeds of two sites."""
@@ -166,29 +168,50 @@ def fit_it(
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
-    epochs: Annotated[int, typer.Option(min=1)] = 30,
+    epochs: Annotated[int, typer.Option(min=1)] = 20,
+    every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = 8,
     seed: int = 0,
+    device: Annotated[str, typer.Option(help="Device of torch.")] = "cpu",
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
 ) -> None:
-    """Fit the surrogate. `calibrate` adds its errors on held-out sites and its intervals."""
+    """Fit the surrogate to most sites; print its errors and the coverage on the others.
+
+    The surrogate's file gets both, and the factors of its intervals.
+    """
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
         named = named_rows(data or DATA, without or ())
         samples = samples_of(named)
+        held_out = folds(samples.site, every, seed)[0]
+        sites, least = len(np.unique(samples.site[held_out])), _HALVES * least_sites()
+        if sites < least:
+            raise BlastEnvError(
+                f"--every {every} holds out {sites} sites, must be at least {least} for the "
+                "intervals: lower it, or give more sites"
+            )
         about = Fit(
             command=_command(),
             versions=versions(),
             engine="; ".join(named["engine"].unique()),
-            blasts=len(samples),
-            sites=len(np.unique(samples.site)),
+            blasts=int((~held_out).sum()),
+            sites=len(np.unique(samples.site[~held_out])),
         )
         began_s = perf_counter()
-        every = np.ones(len(samples), dtype=bool)
-        fitted = fit(samples, every, epochs, seed, about)
-        about = about.model_copy(update={"seconds": round(perf_counter() - began_s, 1)})
-        surrogate = replace(fitted, fit=about)
-        print_line(f"{len(samples):,} loads of {about.sites} sites; wrote {surrogate.save(out)}")
+        fitted = fit(samples, ~held_out, epochs, seed, about, device=device)
+        seconds = round(perf_counter() - began_s, 1)
+        impulse, peak = (
+            Holdout.of(fitted, networks, samples, loads, held_out, seed)
+            for networks, loads in ((fitted.impulse, samples.impulse), (fitted.peak, samples.peak))
+        )
+        off = LoadErrors(impulse.errors, peak.errors)
+        print_line(_errors_table({f"{sites} held-out sites": off}))
+        print_line("\n" + _coverage_table(samples, held_out, impulse.inside, peak.inside, _kind))
+        about = about.model_copy(
+            update={"seconds": seconds, "impulse": impulse.check, "peak": peak.check}
+        )
+        path = replace(fitted, fit=about).save(out)
+        print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
 
 
 def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFrame:
@@ -203,57 +226,15 @@ def samples_of(rows: pd.DataFrame) -> Samples:
     return Samples.of(rows, {scenario.content_hash: scenario for scenario in scenarios})
 
 
-@app.command()
-def calibrate(
-    data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts, as for `fit`.")] = None,
-    without: Annotated[
-        list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
-    ] = None,
-    epochs: Annotated[int, typer.Option(min=1)] = 30,
-    seed: int = 0,
-    surrogate: Annotated[Path, typer.Option(help="Surrogate, .json, that `fit` wrote.")] = Path(
-        "out/surrogate.json"
-    ),
-    device: Annotated[str, typer.Option(help="Device of torch for the fits.")] = "cpu",
-    processes: Processes = 2,
-) -> None:
-    """Fit without each fifth of the sites in turn; print the errors and the coverage there.
-
-    The surrogate's file gets both, and the factors of its intervals.
-    """
-    torch.set_num_threads(1)
-    with user_errors():
-        loaded = load_surrogate(surrogate)
-        samples = samples_of(named_rows(data or DATA, without or ()))
-        held_out = folds(samples.site, _FOLDS, seed)
-        fold = partial(held_out_predictions, samples, epochs, seed, device)
-        with progress_bar("fits") as progress:
-            found = run_all(fold, held_out, processes, progress)
-        impulse, peak = (
-            Holdout.of(samples, loads, held_out, [result[index] for result in found])
-            for index, loads in enumerate((samples.impulse, samples.peak))
-        )
-        sites = f"{len(np.unique(samples.site))} held-out sites"
-        print_line(_errors_table({sites: LoadErrors(impulse.errors, peak.errors)}))
-        print_line("\n" + _coverage_table(samples, impulse.inside, peak.inside, _kind))
-        about = loaded.fit.model_copy(
-            update={
-                "check_command": _command(),
-                "impulse": impulse.check,
-                "peak": peak.check,
-            }
-        )
-        print_line(f"wrote {replace(loaded, fit=about).save(surrogate)}")
-
-
 @dataclass(frozen=True, eq=False)
 class Holdout:
-    """Predictions of one kind of load by fits without the sample's site, and what they show.
+    """Predictions of one kind of load on sites that are held out of the fit, and what they show.
 
     Attributes:
         errors: Errors of the predictions.
-        inside: Whether each load lies in its interval, set on the other folds (samples,).
-        check: Record for the surrogate's file.
+        inside: Whether each load lies in its interval, set on the other half of these sites
+            (held-out samples,).
+        check: Record for the surrogate's file, whose intervals are set on all of them.
     """
 
     errors: Errors
@@ -263,33 +244,38 @@ class Holdout:
     @classmethod
     def of(
         cls,
+        surrogate: Surrogate,
+        networks: Networks,
         samples: Samples,
         loads: Loads,
-        held_out: Sequence[BoolArray],
-        found: Sequence[Predictions],
+        held_out: BoolArray,
+        seed: int,
     ) -> "Holdout":
-        """Join the predictions of all folds."""
-        logs, spreads = np.empty(len(samples)), np.empty(len(samples))
-        for out_of, (own_logs, own_spreads) in zip(held_out, found, strict=True):
-            logs[out_of], spreads[out_of] = own_logs, own_spreads
-        off = logs - loads.target
-        errors = errors_of(Predictions(logs, spreads), loads.target, samples.case)
+        """Compare the predictions of `networks` with the held-out loads."""
+        found = predictions(surrogate, networks, samples, loads, held_out)
+        target, sites = loads.target[held_out], samples.site[held_out]
+        off = found.log_load - target
+        errors = errors_of(found, target, samples.case[held_out])
         check = Check(
             rms=round(errors.rms, 4),
             rank=round(errors.rank, 4),
             lost=round(errors.lost, 4),
-            spreads=round(interval_factor(off, spreads, samples.site), 3),
+            spreads=round(interval_factor(off, found.spread, sites), 3),
         )
-        return cls(errors, covered(off, spreads, samples.site, held_out), check)
+        halves = folds(sites, _HALVES, seed)
+        return cls(errors, covered(off, found.spread, sites, halves), check)
 
 
 def _coverage_table(
-    samples: Samples, impulse: BoolArray, peak: BoolArray, group: Callable[[str], str]
+    samples: Samples,
+    chosen: BoolArray,
+    impulse: BoolArray,
+    peak: BoolArray,
+    group: Callable[[str], str],
 ) -> str:
     """Return the coverage of intervals by group of sites, each site with the same weight."""
-    shares = pd.DataFrame(
-        {"group": [*map(group, samples.scenario)], "site": samples.site, "i": impulse, "p": peak}
-    )
+    groups = [*map(group, samples.scenario[chosen])]
+    shares = pd.DataFrame({"group": groups, "site": samples.site[chosen], "i": impulse, "p": peak})
     by_site = shares.groupby(["group", "site"])[["i", "p"]].mean()
     rows = [
         (
@@ -334,7 +320,7 @@ def check(
                         (loaded.peak, samples.peak, loaded.fit.peak),
                     )
                 )
-                coverage.append(_coverage_table(samples, impulse, peak, str))
+                coverage.append(_coverage_table(samples, every, impulse, peak, str))
         print_line("\n\n".join((_errors_table(found), *coverage)))
 
 
@@ -386,11 +372,7 @@ class LayoutsJudged:
 
 
 def verdict(
-    surrogate: Surrogate,
-    changes: int,
-    evaluator: BlastEvaluator,
-    threat: LoadCase,
-    processes: int = 1,
+    surrogate: Surrogate, changes: int, evaluator: BlastEvaluator, threat: LoadCase
 ) -> LayoutsJudged:
     """Judge the surrogate's proposal after a number of changes, and the rules' layouts."""
     scenario, search = evaluator.scenario, SurrogateSearch(surrogate, changes=changes)
@@ -399,7 +381,7 @@ def verdict(
     ms = MS_PER_S * (perf_counter() - began_s)
     case = LoadCaseSet(scenario, (threat,), charge=threat.charge)
     rules = layouts_by_rule(scenario, threat.charge)
-    reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
+    reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()])
     return LayoutsJudged(
         reduction=reduction,
         promised=promise(surrogate, proposed, case),
@@ -408,27 +390,35 @@ def verdict(
     )
 
 
-def _verdict_row(name: str, found: list[LayoutsJudged]) -> tuple[str, ...]:
-    names = set.intersection(*(set(site.rules) for site in found))
-    single = max(names, key=lambda rule: fmean(site.rules[rule] for site in found))
+def _verdict_row(name: str, found: Sequence[LayoutsJudged]) -> tuple[str, ...]:
+    names = set.intersection(*(set(judged.rules) for judged in found))
+    single = max(names, key=lambda rule: fmean(judged.rules[rule] for judged in found))
+    leads = [judged.reduction - max(judged.rules.values()) for judged in found]
+    lead, low, high = mean_estimate(np.array(leads)).scaled(100.0)
     percent = (
-        fmean(site.reduction for site in found),
-        fmean(site.promised for site in found),
-        fmean(max(site.rules.values()) for site in found),
+        fmean(judged.reduction for judged in found),
+        fmean(judged.promised for judged in found),
+        fmean(max(judged.rules.values()) for judged in found),
     )
     return (
         name,
+        str(len(found)),
         *(f"{100.0 * share:.1f} %" for share in percent),
-        f"{100.0 * fmean(site.rules[single] for site in found):.1f} % ({single})",
-        f"{median(site.ms for site in found):.0f}",
+        f"{lead:+.1f} ({low:.1f} to {high:.1f})" if len(found) > 1 else f"{lead:+.1f}",
+        f"{100.0 * fmean(judged.rules[single] for judged in found):.1f} % ({single})",
+        f"{median(judged.ms for judged in found):.0f}",
     )
 
 
 @app.command()
 def judge(
-    scenarios: Annotated[list[str], typer.Argument(help="Bundled names or paths.")],
+    scenarios: Annotated[list[str] | None, typer.Argument(help="Bundled names or paths.")] = None,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="Generated sites, as for `blasts`: held-out ones.")
+    ] = None,
+    sites: Annotated[int, typer.Option(min=1, help="How many of each kind.")] = 40,
     surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
-    charges: Annotated[int, typer.Option(min=1, help="Held-out charges of each.")] = 6,
+    charges: Annotated[int, typer.Option(min=1, help="Held-out charges of a scenario.")] = 6,
     changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 300,
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
@@ -436,36 +426,46 @@ def judge(
 ) -> None:
     """Compare the surrogate's proposals, by gas dynamics, with its predictions and every rule.
 
-    An exploited surrogate predicts a larger reduction than gas dynamics gives.
+    An exploited surrogate predicts a larger reduction than gas dynamics gives. A row is a scenario,
+    its charges the cases; or a kind of generated sites, with one charge on each.
     """
     with user_errors(), running_on(cluster):
-        loaded, rows = load_surrogate(surrogate), []
-        for name in scenarios:
-            scenario = load_scenario(name)
-            evaluator = BlastEvaluator(scenario, "gas", cache=cache)
-            threats = in_turn(scenario, draw_threats(scenario, SeedRange.TEST.seeds(0, charges)))
-            found = []
-            with progress_bar(scenario.name) as progress:
-                for done, threat in enumerate(threats, start=1):
-                    found.append(verdict(loaded, changes, evaluator, threat, processes))
-                    progress(done / len(threats))
-            rows.append(_verdict_row(scenario.name, found))
-    headers = ("scenario", "surrogate", "it promised", "best rule each", "best single rule", "ms")
-    print_line(markdown_table(headers, rows))
+        places = {load_scenario(name).name: ([name], charges) for name in scenarios or ()}
+        for name in kind or ():
+            places[name.replace("_", " ")] = (held_out_names(name, sites), 1)
+        run = partial(_judged, load_surrogate(surrogate), changes, cache)
+        rows = []
+        for title, (names, count) in places.items():
+            with progress_bar(title) as progress:
+                found = run_all(partial(run, count), names, processes, progress)
+            rows.append(_verdict_row(title, [judged for own in found for judged in own]))
+    headers = ("on", "cases", "surrogate", "it promised", "best rule each")
+    more = ("points beside that, 95 %", "best single rule", "ms")
+    print_line(markdown_table((*headers, *more), rows))
+
+
+def _judged(
+    surrogate: Surrogate, changes: int, cache: Path | None, charges: int, name: str
+) -> list[LayoutsJudged]:
+    """Judge the proposals against the first held-out charges on a site."""
+    scenario = scenario_of(name)
+    evaluator = BlastEvaluator(scenario, "gas", cache=cache)
+    threats = in_turn(scenario, draw_threats(scenario, SeedRange.TEST.seeds(0, charges)))
+    return [verdict(surrogate, changes, evaluator, threat) for threat in threats]
 
 
 def promise(surrogate: Surrogate, layout: Layout, case: LoadCaseSet) -> float:
     """Return the share by which a layout lowers the case's load, as a surrogate predicts it."""
     unprotected, guessed = Guesses.of(surrogate, case).loads([(), layout])
-    return float(1.0 - guessed / unprotected)
+    return float(reductions(np.array([guessed]), np.array([unprotected]))[0])
 
 
 def reductions_of(
-    evaluator: BlastEvaluator, case: LoadCaseSet, layouts: Sequence[Layout], processes: int
+    evaluator: BlastEvaluator, case: LoadCaseSet, layouts: Sequence[Layout]
 ) -> list[float]:
     """Return the share by which each layout lowers the case's load, by gas dynamics."""
     asked = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
-    loads = evaluator.loads_of_many(asked, processes)
+    loads = evaluator.loads_of_many(asked)
     values = np.array([load.load(case.scenario.objective) for load in loads])
     unprotected, *own = (case.combined(item) for item in values.reshape(-1, len(case.threats)))
     return [

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
         fit,
         folds,
         load_errors,
+        predictions,
     )
-    from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor
+    from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor, least_sites
     from blast_env.surrogate.network import (
         SHAPES,
         Check,
@@ -63,9 +64,11 @@ __all__ = [
     "fit",
     "folds",
     "interval_factor",
+    "least_sites",
     "load_errors",
     "load_surrogate",
     "packaged_surrogate",
+    "predictions",
     "site_of",
     "solid_relations",
     "stacked",

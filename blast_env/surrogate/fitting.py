@@ -279,18 +279,6 @@ class Predictions(NamedTuple):
     spread: FloatArray
 
 
-def held_out_predictions(
-    samples: Samples, epochs: int, seed: int, device: str, out_of: BoolArray
-) -> tuple[Predictions, Predictions]:
-    """Return the impulses and peaks of the samples `out_of` a fit to all others."""
-    about = Fit(command="", versions={}, engine="", blasts=1, sites=1)
-    fitted = fit(samples, ~out_of, epochs, seed, about, device=device)
-    return (
-        predictions(fitted, fitted.impulse, samples, samples.impulse, out_of),
-        predictions(fitted, fitted.peak, samples, samples.peak, out_of),
-    )
-
-
 def predictions(
     surrogate: Surrogate,
     networks: Networks,

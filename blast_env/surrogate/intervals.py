@@ -37,13 +37,18 @@ def interval_factor(
     if wanted > len(counts):
         raise BlastEnvError(
             f"{len(counts)} sites are too few for intervals of {coverage:g}: it takes at least "
-            f"{int(np.ceil(coverage / (1.0 - coverage) - 1e-9))}"
+            f"{least_sites(coverage)}"
         )
     ratios = np.abs(errors) / spreads
     order = np.argsort(ratios)
     weight = np.cumsum(1.0 / counts[site][order])
     found = min(int(np.searchsorted(weight, wanted)), len(order) - 1)
     return float(ratios[order[found]])
+
+
+def least_sites(coverage: float = COVERAGE) -> int:
+    """Return the least number of sites that set an interval of such a coverage."""
+    return int(np.ceil(coverage / (1.0 - coverage) - 1e-9))
 
 
 def covered(

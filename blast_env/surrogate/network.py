@@ -91,21 +91,19 @@ class Fit(BaseModel):
         blasts: Number of loads of structures in the fit.
         sites: Number of sites in the fit.
         seconds: Duration of the fit, in s.
-        check_command: Command that made the check.
         impulse: Errors of impulses, if checked.
         peak: Errors of peak overpressures, if checked.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[3] = 3
+    format: Literal[4] = 4
     command: str
     versions: dict[str, str]
     engine: str
     blasts: Annotated[int, Field(ge=1)]
     sites: Annotated[int, Field(ge=1)]
     seconds: Annotated[float, Field(ge=0.0)] = 0.0
-    check_command: str = ""
     impulse: Check | None = None
     peak: Check | None = None
 
@@ -367,8 +365,8 @@ class Surrogate:
         def moved(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
             if check is None:
                 raise BlastEnvError(
-                    "this surrogate has no intervals: `python -m studies.surrogate calibrate` adds "
-                    "them"
+                    "this surrogate has no intervals: `python -m studies.surrogate fit` writes one "
+                    "that has"
                 )
             found: FloatArray = loads * np.exp(check.spreads * spread * half_widths)
             return found

@@ -150,16 +150,17 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate blasts --kind front_sites/18 --sites 100 --layouts 4 --rules 5"
+    "python -m studies.surrogate blasts --kind kerb_sites --sites 100 --layouts 8 --rules 5"
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",
-    "python -m studies.blast_table blasts --sites 420 --out blasts.parquet": "--sites 1",
+    "python -m studies.blast_table blasts --kind kerb_sites --sites 100 --out blasts.parquet": (
+        "--sites 1"
+    ),
     "python -m studies.surrogate fit --out surrogate.json": (
-        "--data docs/data/close_site_blasts.parquet --epochs 1"
+        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
-    " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
-        "--charges 1 --changes 1"
-    ),
+    " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites --sites 24"
+    " --surrogate surrogate.json": "--charges 1 --changes 1 --sites 1",
     # docs/researchers/benchmark.md
     "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
@@ -227,8 +228,7 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
         "200 sites; tests/studies/test_blast_table.py"
     ),
-    "python -m studies.surrogate calibrate --surrogate surrogate.json --device cuda"
-    " --processes 5": ("an hour without a GPU; tests/design/test_surrogate.py"),
+    "python -m studies.data_card": "needs a package of `datasets`; tests/studies/test_data_card.py",
     "python -m studies.real_files FOLDER": "FOLDER is a placeholder for maps of your own",
     "python -m studies.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/studies/test_blast_table.py"

@@ -45,7 +45,6 @@ from blast_env.surrogate import (
     Fit,
     Member,
     Networks,
-    Predictions,
     Samples,
     Surrogate,
     SurrogateEngine,
@@ -57,6 +56,7 @@ from blast_env.surrogate import (
     load_errors,
     load_surrogate,
     packaged_surrogate,
+    predictions,
     site_of,
     solid_relations,
 )
@@ -388,7 +388,7 @@ def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
         assert [getattr(structure, before) for structure in safe.protected] == pytest.approx(upper)
         assert (upper > after[0]).all()
     assert safe_unprotected.structures == unprotected.structures
-    with pytest.raises(BlastEnvError, match=r"has no intervals: .*calibrate"):
+    with pytest.raises(BlastEnvError, match=r"has no intervals: .*surrogate fit"):
         by_hand().upper_ends(guess)
 
 
@@ -619,19 +619,36 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     assert all(float(line[3].strip(" %")) > 80.0 for line in coverage)
 
 
-def test_held_out_predictions_set_the_intervals() -> None:
-    """Errors of three spreads on each twentieth site, of one spread on the others."""
-    samples = Samples.of(table_of_guesses(by_hand(), 40), {YARD.content_hash: YARD})
+def test_a_fit_with_too_few_sites_for_intervals_is_refused_before_it_begins(tmp_path: Path) -> None:
+    table = pq.read_table("docs/data/close_site_blasts.parquet")
+    names = table["scenario"].unique()[:20]
+    few, out = tmp_path / "few.parquet", tmp_path / "surrogate.json"
+    pq.write_table(table.filter(pc.is_in(table["scenario"], names)), few)
+    options = ["fit", "--data", str(few), "--out", str(out)]
+    done = CliRunner().invoke(studies.surrogate.app, options)
+    assert done.exit_code == 2
+    assert "--every 8 holds out 3 sites, must be at least 38" in " ".join(done.output.split())
+    assert not out.exists()
+
+
+def test_held_out_loads_set_the_intervals() -> None:
+    """Off by three spreads on two of 120 sites, by 0.5 to 1 on the others."""
+    fitted = by_hand(members=3)
+    table = table_of_guesses(fitted, 160)
+    samples = Samples.of(table, {YARD.content_hash: YARD})
     samples = replace(samples, site=np.arange(len(samples)))
-    held_out = folds(samples.site, 2, 0)
-    spread = np.full(len(samples), 0.1)
-    off = np.where(samples.site % 40 == 0, 0.3, 0.1)
-    logs = samples.impulse.target + off
-    found = [Predictions(logs[fold], spread[fold]) for fold in held_out]
-    joined = Holdout.of(samples, samples.impulse, held_out, found)
-    assert joined.check.spreads == pytest.approx(1.0)
+    every = np.ones(len(samples), dtype=bool)
+    found = predictions(fitted, fitted.impulse, samples, samples.impulse, every)
+    spreads = np.where(samples.site % 80 == 0, 3.0, np.linspace(0.5, 1.0, len(samples)))
+    loads = replace(samples.impulse, target=found.log_load + spreads * found.spread)
+    held_out = samples.site < 120
+    joined = Holdout.of(fitted, fitted.impulse, samples, loads, held_out, 0)
+    assert 0.85 < joined.check.spreads < 0.9
+    off = (spreads * found.spread)[held_out]
     assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))
-    assert (joined.inside == (off < 0.2)).all()
+    far = spreads[held_out] > 2.0
+    assert not joined.inside[far].any()
+    assert 0.9 < joined.inside[~far].mean() < 1.0
 
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:

@@ -17,6 +17,7 @@ TABLES: Final = (
     "many_site_blasts",
     "close_site_blasts",
     "front_site_blasts",
+    "kerb_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
