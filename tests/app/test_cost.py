@@ -83,7 +83,7 @@ def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
 def test_words() -> None:
     cost = CostGuess(cells=2_000_000, steps=750, memory_bytes=0.5e9, moved=3.5e9)
     assert cost_words([cost]) == "a blast of gas: about 2 min on a busy core, 0.5 GB"
-    assert "50 blasts of gas: about 83 min" in cost_words([cost] * 50)
+    assert "50 blasts of gas: about 1.9 h" in cost_words([cost] * 50)
     assert "nothing to run" in cost_words([])
     assert [time_words(value) for value in (0.2, 7.1, 44.0, 600.0, 7200.0)] == [
         *("1 s", "8 s", "45 s", "10 min", "2.0 h")

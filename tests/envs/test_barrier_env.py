@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from blast_env.arrays import BoolArray, FloatArray
+from blast_env.arrays import FloatArray
 from blast_env.envs.observable import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
@@ -215,7 +215,7 @@ class PayAtTheEnd:
     def terms(self, scenario: Scenario) -> tuple[str, ...]:
         return "first", "end"
 
-    def paid(self, begins: BoolArray, ended: BoolArray, reductions: FloatArray) -> FloatArray:
+    def paid(self, begins: np.ndarray, ended: np.ndarray, reductions: FloatArray) -> FloatArray:
         return np.stack((3.0 * begins, 10.0 * ended + reductions), axis=1)
 
 

@@ -13,9 +13,9 @@ from tests.report.sites import LAYOUT, glazed_hut
 
 @pytest.fixture(scope="package", autouse=True)
 def _probabilities_are_drawn_once() -> Iterator[None]:
-    """And a fiftieth of the draws: many pages show one study."""
+    """And a tenth of the draws: many pages show one study."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(summary, "level_probability", cache(partial(level_probability, draws=20)))
+        patch.setattr(summary, "level_probability", cache(partial(level_probability, draws=100)))
         yield
 
 
