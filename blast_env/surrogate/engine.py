@@ -80,9 +80,6 @@ class SurrogateEngine(Engine):
 
     Attributes:
         surrogate: The surrogate; by default the bundled one.
-        safe: Whether the loads behind barriers are the upper ends of their 95 % intervals, so
-            that a reduction is at its safe end and training does not live on the errors of the
-            surrogate.
         digest: Its digest.
     """
 
@@ -92,7 +89,6 @@ class SurrogateEngine(Engine):
     validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
 
     surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
-    safe: bool = False
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
@@ -103,8 +99,7 @@ class SurrogateEngine(Engine):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "digest", self.surrogate.digest)
-        safe = " safe" if self.safe else ""
-        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}{safe}")
+        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}")
 
     def loads(
         self,
@@ -126,8 +121,7 @@ class SurrogateEngine(Engine):
             predicted.
 
         Raises:
-            BlastEnvError: If no structure is protected, or the surrogate has no intervals and
-                `safe` is set.
+            BlastEnvError: If no structure is protected.
         """
         return self.loads_at_once([EngineBlast(scenario, layout, charge, seed)])[0]
 
@@ -154,8 +148,6 @@ class SurrogateEngine(Engine):
                 charges = [charge_against(*number[:3]) for number in own]
                 layouts = [number.layout for number in own]
                 guess = self.surrogate.guess(served.site, layouts, charges)
-            if self.safe:
-                guess = self.surrogate.upper_ends(guess, np.array([bool(e.layout) for e in own]))
             for number, loads in zip(numbers, served.loads(guess), strict=True):
                 found[number] = loads
         return [blast_loads for blast_loads in found if blast_loads is not None]
@@ -178,8 +170,6 @@ def is_surrogate(name: str) -> bool:
 def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None = None) -> Engine:
     """Return an engine by its name, which may be that of a surrogate.
 
-    A surrogate with intervals is safe (`SurrogateEngine`).
-
     Args:
         name: The name of an engine, or a surrogate's file (.json).
         cell_m: Side of the cells of gas dynamics; by default the engine's.
@@ -192,5 +182,4 @@ def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None
     if not is_surrogate(name):
         return find_engine(name, cell_m, cells=cells)
     surrogate = packaged_surrogate() if name == SURROGATE else load_surrogate(Path(name))
-    safe = surrogate.fit.impulse is not None
-    return find_engine(SurrogateEngine(surrogate, safe=safe), cell_m, cells=cells)
+    return find_engine(SurrogateEngine(surrogate), cell_m, cells=cells)

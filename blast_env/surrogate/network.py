@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from blast_env.arrays import BoolArray, FloatArray
+from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -339,17 +339,13 @@ class Surrogate:
             return Guess(*impulse)
         return Guess(*impulse, *of(1, attrgetter("log_peak")))
 
-    def upper_ends(self, guess: Guess, which: BoolArray | bool = True) -> Guess:
+    def upper_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
-
-        Args:
-            guess: The predictions.
-            which: Layouts to change (layouts,); the others stay.
 
         Raises:
             BlastEnvError: If the surrogate has no intervals.
         """
-        return self._moved(guess, np.atleast_1d(which)[:, np.newaxis].astype(float))
+        return self._moved(guess, 1.0)
 
     def lower_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the lower ends of their 95 % intervals.
@@ -357,10 +353,10 @@ class Surrogate:
         Raises:
             BlastEnvError: If the surrogate has no intervals.
         """
-        return self._moved(guess, np.array(-1.0))
+        return self._moved(guess, -1.0)
 
-    def _moved(self, guess: Guess, half_widths: FloatArray) -> Guess:
-        """Return predicted loads moved by numbers of half-widths of their intervals."""
+    def _moved(self, guess: Guess, half_widths: float) -> Guess:
+        """Return predicted loads moved by a number of half-widths of their intervals."""
 
         def moved(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
             if check is None:

@@ -193,7 +193,7 @@ class _OfCase:
 
 
 def _environment(problem: BenchmarkProblem, action: str) -> BlastBarrierEnv:
-    """Return the environment of a problem, on the safe ends of the surrogate's guesses."""
+    """Return the environment of a problem, on the surrogate's guesses."""
     torch.set_num_threads(1)
     return BlastBarrierEnv(
         problem.scenario,
@@ -202,7 +202,7 @@ def _environment(problem: BenchmarkProblem, action: str) -> BlastBarrierEnv:
         action=action,
         threat=_OfCase(problem.case),
         realisations=1,
-        engine=SurrogateEngine(safe=True),
+        engine=SurrogateEngine(),
     )
 
 
