@@ -11,17 +11,19 @@ from typing import Any
 
 import pytest
 
-mcp = pytest.importorskip("mcp", reason="needs the extra mcp: `make matrix-mcp`")
+# openenv brings an mcp below 2, which has no `mcp_types`.
+pytest.importorskip("mcp_types", reason="needs the extra mcp: `make matrix-mcp`")
 
-import anyio  # noqa: E402
-import httpx2  # noqa: E402  # comes with mcp
-from mcp.client.stdio import StdioServerParameters  # noqa: E402
-from mcp.client.streamable_http import streamable_http_client  # noqa: E402
+import anyio
+import httpx2  # comes with mcp
+import mcp
+from mcp.client.stdio import StdioServerParameters
+from mcp.client.streamable_http import streamable_http_client
 
-from blast_env.tools import TOOLS, Episode, Sessions  # noqa: E402
-from blast_env.tools.mcp_door import mcp_server  # noqa: E402
-from blast_env.tools.scripts import played_in, rules_guesses_blasts  # noqa: E402
-from tests.tools.row_session import BEST, session, walls  # noqa: E402
+from blast_env.tools import TOOLS, Episode, Sessions
+from blast_env.tools.mcp_door import mcp_server
+from blast_env.tools.scripts import played_in, rules_guesses_blasts
+from tests.tools.row_session import BEST, session, walls
 
 
 def sessions() -> Sessions:
