@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from blast_env.answers.terminal import print_line
-from blast_env.benchmark.data import TABLES
+from blast_env.benchmark.data import TABLES, load
 from blast_env.cli.output import user_errors
 from blast_env.errors import import_extra
 from blast_env.files import write_text
@@ -30,6 +30,7 @@ _ORIGINS: Final = {
     "front_site_blasts": "such sites on which only the walls count that the blast comes from",
     "kerb_site_blasts": "generated sites along a kerb, with walls opposite and vehicles",
 }
+_CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)
 _COUNTS: Final = ("seed",)
 
@@ -103,6 +104,20 @@ def _field(mlc: Any, table: str, column: Column) -> Any:
     )
 
 
+def contents() -> str:
+    """Return in words how much there is: rows, blasts, sites, splits and charges."""
+    rows = load()
+    blasts = rows.groupby(["scenario_hash", "layout", *_CHARGE]).ngroups
+    sites = rows.drop_duplicates("scenario_hash")["split"].value_counts()
+    known = rows["unprotected_impulse_pa_s"].notna().mean()
+    low_kg, high_kg = rows["tnt_kg"].quantile([0.1, 0.9])
+    return (
+        f"{len(rows):,} rows, {blasts:,} blasts, {sites.sum():,} sites ({sites['validation']} for "
+        f"validation, {sites['test']} for test); {100.0 * known:.0f} % of the rows have the load "
+        f"without a barrier; in 80 % of them the charge has {low_kg:.0f} to {high_kg:.0f} kg"
+    )
+
+
 def digest_of(path: Path) -> str:
     """Return the SHA-256 of a file, in hexadecimal digits."""
     return sha256(path.read_bytes()).hexdigest()
@@ -117,6 +132,7 @@ def main(
         import mlcroissant as mlc
 
         issues = mlc.Dataset(jsonld=str(out)).metadata.ctx.issues
+        print_line(contents())
         print_line(f"wrote {out}; {len(issues.errors)} errors, {len(issues.warnings)} warnings")
 
 

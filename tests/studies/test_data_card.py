@@ -1,6 +1,7 @@
 """The published metadata of the blasts; its package is large, so that `make test` leaves it out."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,15 @@ def test_it_says_what_each_column_is(table: str) -> None:
     for field, column in zip(record["field"], COLUMNS, strict=True):
         assert field["description"].startswith(column.meaning)
         assert f"({column.unit})" in field["description"] or not column.unit
+
+
+def test_the_page_says_how_much_there_is() -> None:
+    """Each number of `contents` stands on the page, so that neither is forgotten."""
+    page = Path("docs/researchers/benchmark.md").read_text(encoding="utf-8")
+    numbers = re.findall(r"\d[\d,]*", data_card.contents())
+    assert len(numbers) == 9
+    card = page[page.index("- **Content**") : page.index("- **Metadata**")]
+    assert set(numbers) <= set(re.findall(r"\d[\d,]*", card.replace(", ", " ")))
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of its own use of rdflib
