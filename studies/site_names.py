@@ -21,6 +21,7 @@ from blast_env.sites import (
     generate_site,
     kerb_site,
     large_ranges,
+    street_site,
 )
 
 CLOSE_SITES: Final = "close_sites"
@@ -32,6 +33,9 @@ FRONT_SITES: Final = "front_sites"
 KERB_SITES: Final = "kerb_sites"
 """Kind of `kerb_site`, of any size."""
 
+STREET_SITES: Final = "street_sites"
+"""Kind of `street_site`, of any size."""
+
 _LEAST_SEEN_M: Final = 1.0
 """Distance of the charge in front of a wall beyond which the wall faces it."""
 
@@ -41,8 +45,8 @@ def scenario_of(name: str) -> Scenario:
 
     Args:
         name: A bundled scenario, or the KIND/SEED of a generated site, where the kind is
-            `item_sites`, `kerb_sites`, or one of `close_sites/18`, `front_sites/18` and
-            `large_sites/60` with the side in m.
+            `item_sites`, `kerb_sites`, `street_sites`, or one of `close_sites/18`, `front_sites/18`
+            and `large_sites/60` with the side in m.
 
     Raises:
         BlastEnvError: If there is no such scenario or kind, or as `generate_site`.
@@ -131,7 +135,7 @@ def _front_site(seed: int, side_m: float) -> Scenario:
 
 
 _UNSIZED: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
-    {ITEM_SITES: _item_site, KERB_SITES: kerb_site}
+    {ITEM_SITES: _item_site, KERB_SITES: kerb_site, STREET_SITES: street_site}
 )
 _SIZED: Final[Mapping[str, Callable[[int, float], Scenario]]] = MappingProxyType(
     {CLOSE_SITES: _close_site, FRONT_SITES: _front_site, LARGE_SITES: _large_site}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         close_ranges,
         large_ranges,
     )
-    from blast_env.sites.kerb_sites import KerbSiteRanges, kerb_site
+    from blast_env.sites.kerb_sites import KerbSiteRanges, kerb_site, street_site
     from blast_env.sites.module_sites import SiteRanges
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
     from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
@@ -62,6 +62,7 @@ __all__ = [
     "generate_site",
     "kerb_site",
     "large_ranges",
+    "street_site",
     "training_sites",
     "turned",
     "visibility_layout",

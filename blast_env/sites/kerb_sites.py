@@ -41,6 +41,12 @@ ACROSS_M: Final[Span] = (13.0, 34.0)
 ALONG_M: Final[Span] = (10.0, 24.0)
 """Least and largest size along the kerb, m."""
 
+STREET_ACROSS_M: Final[Span] = (9.0, 18.0)
+"""Least and largest size of a street from behind one front to behind the other, m."""
+
+STREET_ALONG_M: Final[Span] = (10.0, 26.0)
+"""Least and largest size along the street, m."""
+
 _HEIGHTS_M: Final = (0.8, 1.0, 1.0, 1.4, 2.0, 2.0, 2.5, 3.0, 3.6, 3.6, 4.0)
 """Heights of pieces of the catalogue and of T-walls."""
 
@@ -101,7 +107,7 @@ class KerbSiteRanges(Ranges):
     places: Counts = (1, 3)
     vehicle_probability: Probability = 0.3
     entry_m: Lengths = (4.0, 7.0)
-    kerb_m: Lengths = (3.0, 10.0)
+    kerb_m: Gaps = (3.0, 10.0)
     zone_from_charge_m: Lengths = (1.0, 2.5)
     clearance_m: Gaps = (0.0, 1.0)
     strip_probability: Probability = 0.3
@@ -171,6 +177,31 @@ def kerb_site(seed: int) -> Scenario:
     draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M))))
     across_m, along_m = draws.length_m(ACROSS_M), draws.length_m(ALONG_M)
     return generate_site(seed, KerbSiteRanges(across_m=across_m, along_m=along_m))
+
+
+def street_site(seed: int) -> Scenario:
+    """Return the site of a seed where a vehicle drives along the fronts, to within 2 m of them.
+
+    It is a street between the protected fronts and a building opposite, open at both ends.
+
+    Args:
+        seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
+    """
+    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 1)))
+    across_m, along_m = draws.length_m(STREET_ACROSS_M), draws.length_m(STREET_ALONG_M)
+    ranges = KerbSiteRanges(
+        across_m=across_m,
+        along_m=along_m,
+        opposite_probability=1.0,
+        wing_probability=0.0,
+        vehicle_probability=1.0,
+        kerb_m=(0.0, 2.0),
+        zone_from_charge_m=(0.5, 1.0),
+    )
+    return generate_site(seed, ranges)
 
 
 def _draw_plan(draws: Draws, ranges: KerbSiteRanges) -> KerbSitePlan:

@@ -1,4 +1,4 @@
-"""Sites along a kerb: valid, of many sizes, like the small bundled ones."""
+"""Sites along a kerb or a street: valid, of many sizes, like the small bundled ones."""
 
 from functools import cache
 
@@ -7,7 +7,7 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.site import Scenario
-from blast_env.sites import KerbSiteRanges, generate_site, kerb_site
+from blast_env.sites import KerbSiteRanges, generate_site, kerb_site, street_site
 from blast_env.sites.kerb_sites import ACROSS_M, ALONG_M
 
 SEEDS = range(20_000, 20_012)
@@ -55,3 +55,26 @@ def test_a_given_size_is_that_of_every_site() -> None:
     for seed in SEEDS[:3]:
         size = generate_site(seed, ranges).site
         assert {size.width_m, size.height_m} == {16.0, 12.0}
+
+
+def test_a_vehicle_of_a_street_drives_along_the_front() -> None:
+    for site in map(street_site, SEEDS[:6]):
+        (source,) = site.charge
+        (road,) = source.drivable
+        front = next(structure for structure in site.structures if structure.protected)
+        gaps_m = [
+            max(low - end, start - high)
+            for low, high, start, end in zip(
+                road.rectangle_m[:2],
+                road.rectangle_m[2:],
+                front.rectangle_m[:2],
+                front.rectangle_m[2:],
+                strict=True,
+            )
+        ]
+        assert 0.0 <= max(gaps_m) <= 2.0
+        ends_m = {entry.start_m for entry in source.entries} | {
+            entry.end_m for entry in source.entries
+        }
+        assert len(source.entries) == 2
+        assert len(ends_m) == 4
