@@ -1,14 +1,108 @@
-"""A notice when Numba compiles, which it does once per installation and takes many seconds."""
+"""Code that Numba compiles: kept on disk until any of its sources changes, with a notice first."""
 
 import logging
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final
 
+import numpy as np
+from numba import njit
 from numba.core import event
+from numba.core.caching import FunctionCache
 
 _LOGGER: Final = logging.getLogger("blast_env")
+
+
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator as `numba.njit` with `cache=True`, whose cache knows all of its sources.
+
+    Numba keeps compiled code until the file of the function changes. Functions and constants of
+    other files that it uses go into that code too, and a change of those would go unseen. Here the
+    key in the cache has a digest of all of them, and of the options.
+
+    Args:
+        options: Options of `numba.njit`.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = njit(**options)(function)
+        dispatcher._cache = _SourcesCache(function, repr(sorted(options.items())))
+        return dispatcher
+
+    return decorate
+
+
+class _SourcesCache(FunctionCache):
+    """Numba's cache of a function, with a digest of its sources in the key of an entry."""
+
+    def __init__(self, function: Callable[..., Any], options: str) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._options = options
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        key = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
+        return *key, self._options, _source_digest(self._py_func)
+
+
+@cache
+def _source_digest(function: FunctionType) -> str:
+    """Return a digest of the sources of a function and of all that it uses of its package."""
+    digest, sources = sha256(), _Sources(function.__module__.partition(".")[0])
+    sources.add(function)
+    for path in sorted(sources.paths):
+        digest.update(path.read_bytes())
+    digest.update("\n".join(sources.constants).encode())
+    return digest.hexdigest()
+
+
+class _Sources:
+    """The files of functions and types, and the values of constants, that a function uses.
+
+    Attributes:
+        package: The top-level package; Numba's version stands for other ones.
+        paths: Files of the functions and types.
+        constants: Names and values of the constants, in order of their use.
+    """
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+        self.paths: set[Path] = set()
+        self.constants: list[str] = []
+        self._seen: set[int] = set()
+
+    def add(self, value: Any, name: str = "") -> None:
+        """Add what a name in a compiled function stands for, and all that this uses in turn."""
+        value = getattr(value, "py_func", value)  # a function, where it is compiled
+        if isinstance(value, ModuleType) or id(value) in self._seen:
+            return
+        if not callable(value):
+            held = value.tobytes() if isinstance(value, np.ndarray) else value
+            self.constants.append(f"{name} = {held!r}")
+        elif str(value.__module__).partition(".")[0] == self.package:
+            self._seen.add(id(value))
+            self._add_file(value.__module__)
+            if isinstance(value, FunctionType):
+                for used in value.__closure__ or ():
+                    self.add(used.cell_contents, name)
+                self._add_names(value.__code__, value.__globals__)
+
+    def _add_file(self, module: str) -> None:
+        path = sys.modules[module].__file__
+        if path is not None:
+            self.paths.add(Path(path))
+
+    def _add_names(self, code: CodeType, names: dict[str, Any]) -> None:
+        for name in code.co_names:
+            if name in names:
+                self.add(names[name], name)
+        for constant in code.co_consts:
+            if isinstance(constant, CodeType):
+                self._add_names(constant, names)
 
 
 class _Listener(event.Listener):

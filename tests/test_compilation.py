@@ -1,8 +1,8 @@
 """Compiling: once per installation, with a notice, and again when any of the sources changed."""
 
+import importlib
 import logging
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +11,7 @@ from typing import Any
 import pytest
 from numba import njit
 
-import blast_env
 from blast_env.compilation import compilation_notice
-from blast_env.particles.event import engine as event_engine
 
 FIRST_BLAST = """
 import sys
@@ -57,67 +55,70 @@ def test_the_first_blast_of_an_installation_gives_it(
     assert logged.startswith("compiling ")
 
 
-# --- Compiling: once per installation, with a notice, and again when any of the sources changed.
+# --- Compiled code is kept until one of its sources changes, in whichever file that is.
 
 
-NOTICE = "compiling the event engine"
-SEEDS = range(2)
-CODE = f"""
-import logging
-logging.basicConfig(format="%(name)s: %(message)s")
-import blast_env
-print(blast_env.__file__)
-scenario = blast_env.load_scenario("courtyard")
-for seed in {SEEDS}:
-    print(blast_env.simulate(scenario, seed=seed, engine="event").digest)
-"""
+SOURCES = {
+    "numbers.py": "FACTOR = 3.0\n",
+    "steps.py": """
+from numba import njit
+
+@njit
+def halved(value):
+    return value / 2.0
+""",
+    "kernel.py": """
+from blast_env.compilation import compiled
+from PACKAGE.numbers import FACTOR
+from PACKAGE.steps import halved
+
+@compiled(error_model="numpy")
+def kernel(value):
+    return FACTOR * halved(value)
+""",
+}
 
 
-def start_in(folder: Path) -> subprocess.Popen[str]:
-    """Begin to run two blasts with the package in `folder`."""
-    own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    return subprocess.Popen(
-        [sys.executable, "-c", CODE],
-        cwd=folder,
-        env=own,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def kernel_of(folder: Path) -> Any:
+    """Import the kernel of a package as a new process does."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == folder.name]:
+        del sys.modules[name]
+    importlib.invalidate_caches()
+    return importlib.import_module(f"{folder.name}.kernel").kernel
 
 
-@pytest.mark.slow
-def test_the_first_run_compiles_and_says_so_and_only_the_first(tmp_path: Path) -> None:
-    """In a copy of the package and of what was compiled here, of which one file is then changed."""
-    scenario = blast_env.load_scenario("courtyard")
-    digests = [blast_env.simulate(scenario, seed=seed, engine="event").digest for seed in SEEDS]
-    package = Path(blast_env.__file__).parent
-    without = shutil.ignore_patterns("__pycache__", "*.png")
-    shutil.copytree(package, tmp_path / "blast_env", ignore=without)
-    shutil.copytree(package.parent / "scenarios", tmp_path / "scenarios")
-    compiled: Any = event_engine._RUN
-    shutil.copytree(
-        compiled.stats.cache_path, tmp_path / "blast_env" / "particles" / "event" / "__pycache__"
-    )
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of a package with a kernel whose code is on disk."""
+    folder = tmp_path / f"kernels_{tmp_path.name.replace('-', '_')}"
+    folder.mkdir()
+    for name, text in SOURCES.items():
+        (folder / name).write_text(text.replace("PACKAGE", folder.name), encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    assert kernel_of(folder)(8.0) == 12.0
+    return folder
 
-    with start_in(tmp_path) as process:
-        printed, logged = process.communicate()
-    path, *again = printed.split()
-    assert Path(path).is_relative_to(tmp_path)
-    assert (again, logged) == (digests, "")
 
-    # Not the file of the function that is kept on disk: a change of that one Numba would notice.
-    source = tmp_path / "blast_env" / "particles" / "event" / "contacts.py"
-    text = source.read_text(encoding="utf-8")
-    changed = text.replace(
-        "-(1.0 + restitution) * reduced_mass", "-(1.5 + restitution) * reduced_mass"
-    )
-    assert changed != text
-    source.write_text(changed, encoding="utf-8")
-    # Without optimisation compiling takes a third of the time.
-    with start_in(tmp_path) as process:
-        assert process.stderr is not None
-        logged = process.stderr.readline()  # Numba has begun; to wait for its end proves no more
-        process.kill()
-    assert logged.startswith("blast_env: ")
-    assert NOTICE in logged
+def test_code_on_disk_serves_while_no_source_changes(package: Path) -> None:
+    again = kernel_of(package)
+    assert again(8.0) == 12.0
+    assert sum(again.stats.cache_hits.values()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "expected"),
+    [
+        pytest.param("numbers.py", "3.0", "5.0", 20.0, id="constant"),
+        pytest.param("steps.py", "2.0", "4.0", 6.0, id="function"),
+        pytest.param("kernel.py", '"numpy"', '"numpy", fastmath=True', 12.0, id="option"),
+    ],
+)
+def test_a_change_of_any_source_compiles_again(
+    package: Path, name: str, old: str, new: str, expected: float
+) -> None:
+    path = package / name
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    changed = kernel_of(package)
+    assert changed(8.0) == expected
+    assert sum(changed.stats.cache_hits.values()) == 0

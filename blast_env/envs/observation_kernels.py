@@ -1,14 +1,14 @@
 """The vectors of many episodes, compiled."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
+from blast_env.compilation import compiled
 from blast_env.envs.observable import Plane
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def put_vectors(
     own: IntArray,
     constants: Plane,

@@ -19,9 +19,6 @@ Where lanes differ, values are selected without branches.
 The ghost state of a cell is its mirror image beside a solid cell, and its copy beside an open face.
 A sweep moves only vectors with a cell of air and of the extent of their row. Outside the extent is
 still air or no gas, so that nothing flows there.
-
-All kernels are in one file, because Numba's cache is invalidated by changes of the file of the
-function called from Python, and by no others.
 """
 
 from typing import Any, Final
@@ -30,6 +27,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from blast_env.compilation import compiled
 from blast_env.gas.simd import (
     all_zero,
     everywhere,
@@ -516,7 +514,7 @@ def _sweep_of(fuel: bool) -> Any:
 _with_fuel, _without_fuel = _sweep_of(True), _sweep_of(False)
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def sweep(
     state: Reals,
     code: NDArray[np.int8],

@@ -19,9 +19,9 @@ from math import isnan
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from blast_env.compilation import compiled
 from blast_env.errors import BlastEnvError
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.solver import Gas
@@ -35,7 +35,7 @@ _RISE, _RISE_TIME, _NOW = 6, 7, 8
 _COLUMNS: Final = 9
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _add_step(
     loads: NDArray[np.float64],
     overpressure: NDArray[np.float64],

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from blast_env.compilation import compiled
 from blast_env.errors import BlastEnvError
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, Burning, GasSolver
@@ -383,7 +384,7 @@ def _unit_profiles(explosive: Explosive) -> _Profiles:
     return _Profiles(explosive)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _lay(
     result: Floats,
     solid: NDArray[np.bool_],

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from blast_env.compilation import compiled
 from blast_env.errors import BlastEnvError
 from blast_env.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA
 from blast_env.gas.state import GAMMA
@@ -179,7 +180,7 @@ class SphericalBlast:
         self.shell_m *= 2.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _march(
     state: Floats,
     shell_m: float,

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from blast_env.compilation import compiled
 from blast_env.gas.simd import called_rarely, fetch, get, lanes_at, place, put
 
 Reals = NDArray[Any]
@@ -69,7 +70,7 @@ def lift(state: Any, cells: int, first: int, notes: Any) -> None:
             put(notes, 1, get(notes, 1) + 1.0)
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def burn(state: Reals, extent: Extent, share: Any, heat: Any) -> None:
     """Convert a share of the fuel in the cells of an extent to energy, `heat` per mass."""
     for z in range(extent.shape[0]):
@@ -80,7 +81,7 @@ def burn(state: Reals, extent: Extent, share: Any, heat: Any) -> None:
                 state[ENERGY, z, y, x] += heat * burnt
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def cool(state: Reals, extent: Extent, hottest: Any) -> None:
     """Add mass to gas hotter than `hottest` times still air, down to that temperature.
 
@@ -101,7 +102,7 @@ def cool(state: Reals, extent: Extent, hottest: Any) -> None:
                 state[DENSITY, z, y, x] = max(density, pressure / hottest)
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def fastest_signal(state: Reals) -> float:
     """Return the largest signal speed, which limits the time step.
 
@@ -121,7 +122,7 @@ def fastest_signal(state: Reals) -> float:
     return fastest
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def widen(extent: Extent, whole: Extent, axis: int) -> None:
     """Extend an extent along an axis by the range of a sweep, one cell.
 
@@ -166,7 +167,7 @@ def _unite(row: Any, first: int, end: int) -> None:
         row[1] = max(row[1], end)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def layers_of(extent: Extent, axis: int) -> tuple[int, int, int]:
     """Return the first layer of cells in an extent, the last + 1, and the number of cells.
 
@@ -184,7 +185,7 @@ def layers_of(extent: Extent, axis: int) -> tuple[int, int, int]:
     return max(first, 0), end, cells
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def tighten(state: Reals, still: Reals, extent: Extent) -> None:
     """Remove the cells of still air at both ends of each row of an extent.
 
@@ -218,7 +219,7 @@ def _is_still(state: Reals, still: Reals, z: int, y: int, x: int) -> bool:
     return k == len(still)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def merge(
     fine: Reals,
     fine_code: NDArray[np.int8],

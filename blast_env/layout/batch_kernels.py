@@ -5,9 +5,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.compilation import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def place(
     indices: IntArray,
     numbers: IntArray,
@@ -40,7 +41,7 @@ def place(
             legal[index, other, bottom : row + high, start : column + wide] = False
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def find_full(indices: IntArray, legal: BoolArray, is_full: BoolArray) -> None:
     """Find whether each of some layouts has no legal place left."""
     for index in indices:
@@ -94,7 +95,7 @@ def _exact_costs(
     return found
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def limit_to_budget(
     indices: IntArray,
     numbers: IntArray,

@@ -7,9 +7,9 @@ middles; each step has the exact impulse of the history.
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import FloatArray
+from blast_env.compilation import compiled
 
 _STRONGEST: Final = -np.log(0.01)
 """The risk B at which 99 of 100 panes have broken."""
@@ -18,7 +18,7 @@ _MOST_TIMES: Final = 50
 """Limit of the number of steps, in multiples of those for the load and one period."""
 
 
-@njit(cache=True)
+@compiled()
 def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
     """Return the index of the end of a polyline's segment at a place, searched from `begin`."""
     # Neighbouring steps lie on the same or the next segment: a walk from the last one is shorter
@@ -31,7 +31,7 @@ def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
     return upper
 
 
-@njit(cache=True)
+@compiled()
 def straight(points: FloatArray, values: FloatArray, at: float, upper: int) -> float:
     """Return the value at a place on the line through a polyline's segment that ends at `upper`."""
     slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
@@ -39,7 +39,7 @@ def straight(points: FloatArray, values: FloatArray, at: float, upper: int) -> f
     return value
 
 
-@njit(cache=True)
+@compiled()
 def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
     """Return a polyline's value, as an odd function, extrapolated linearly beyond its end."""
     size = abs(at)
@@ -47,7 +47,7 @@ def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
     return value if at >= 0.0 else -value
 
 
-@njit(cache=True)
+@compiled()
 def impulse_until(
     time_s: FloatArray, pressure_pa: FloatArray, impulse_pa_s: FloatArray, begin: int, at_s: float
 ) -> tuple[float, int]:
@@ -69,7 +69,7 @@ def impulse_until(
     return impulse_pa_s[place] + gone_s * (pressure_pa[place] + 0.5 * slope * gone_s), place
 
 
-@njit(cache=True)
+@compiled()
 def integrate(
     mass: float,
     points: FloatArray,
@@ -137,7 +137,7 @@ def integrate(
     out[3], out[4], out[5] = largest, offset, is_cracked
 
 
-@njit(cache=True)
+@compiled()
 def bend(
     mass: float,
     points: FloatArray,
@@ -221,7 +221,7 @@ def bend(
     out[6] = max(0.0, track[1, : last + 1].max())
 
 
-@njit(cache=True)
+@compiled()
 def move_piece(
     force: FloatArray, mass: float, height: float, base: float, friction: float, step_s: float
 ) -> tuple[float, float, float]:

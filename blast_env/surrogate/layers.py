@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from blast_env.compilation import compiled
 from blast_env.gas.simd import fill, get, lanes_at, larger, load, place, put, smaller, store
 from blast_env.gas.state import FUSED
 
@@ -153,7 +154,7 @@ def two_layers(
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def _put_two_layers(
     rows: Any,
     first: Any,
@@ -183,7 +184,7 @@ def _put_two_layers(
                     found[member, row + number, index] = last[number, index]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def first_sums(rows: SingleArray, weights: SingleArray, bias: SingleArray) -> SingleArray:
     """Return the sums of a layer before its bend (members, rows, outputs).
 

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.compilation import compiled
 from blast_env.gas.simd import place
 from blast_env.gas.state import FUSED
 from blast_env.surrogate.layers import ROWS_AT_ONCE, SingleArray, buffers, four_rows, four_sums
@@ -188,7 +189,7 @@ def _put_shares(
             found[point, share] = min(max(scaled, -most), most)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=FUSED)
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def _put_differs(
     layouts: Any,
     stopped: Any,

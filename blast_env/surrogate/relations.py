@@ -11,9 +11,9 @@ from math import hypot, log, sqrt
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import FloatArray
+from blast_env.compilation import compiled
 
 RELATIONS: Final = 15
 """Number of relations per solid and point."""
@@ -25,7 +25,7 @@ _MOST: Final = 6.0
 """Bound on the magnitude of all relations."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def solid_relations(
     start_m: FloatArray,
     points_m: FloatArray,
@@ -90,7 +90,7 @@ def solid_relations(
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _away_m(x_m: float, y_m: float, solid: FloatArray) -> float:
     """Return the distance in plan from a position to a solid."""
     beside_m = max(solid[0] - x_m, x_m - solid[2], 0.0)
@@ -98,7 +98,7 @@ def _away_m(x_m: float, y_m: float, solid: FloatArray) -> float:
     return hypot(beside_m, before_m)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _detour_m(there_m: float, way_m: float, off_m: float) -> float:
     """Return the excess length of a path that passes `off_m` from the straight one at `there_m`."""
     return sqrt(there_m**2 + off_m**2) + sqrt((way_m - there_m) ** 2 + off_m**2) - way_m

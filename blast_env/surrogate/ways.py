@@ -16,9 +16,9 @@ from math import exp, sqrt
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.compilation import compiled
 
 STATIONS: Final = (0.2, 0.5, 0.8)
 """Positions of the detours along the straight path, as shares of its length."""
@@ -152,7 +152,7 @@ class Ways:
         return is_behind
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _weights_left(
     start_m: FloatArray,
     points_m: FloatArray,
@@ -193,13 +193,13 @@ def _weights_left(
     return left
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
     """Return the square of a distance in plan."""
     return float((other_m[0] - one_m[0]) ** 2 + (other_m[1] - one_m[1]) ** 2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _open_shares(
     chosen: IntArray, stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray
 ) -> FloatArray:
@@ -217,7 +217,7 @@ def _open_shares(
     return shares
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _stop_each(
     start_m: FloatArray,
     points_m: FloatArray,
@@ -242,7 +242,7 @@ def _stop_each(
         )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _stop(
     start_m: FloatArray,
     points_m: FloatArray,
@@ -297,7 +297,7 @@ def _stop(
         first = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _intersect(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
     """Record where a straight line in plan enters and leaves solids, with their heights.
 
@@ -322,7 +322,7 @@ def _intersect(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: 
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _is_stopped(start_m: float, end_m: float, met: FloatArray) -> bool:
     """Return whether a line between two heights is below the top of any solid it crosses."""
     rise_m = end_m - start_m

@@ -4,13 +4,13 @@ Lengths and labels are those of `blast_env.vehicles.driving_steps`.
 """
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.compilation import compiled
 from blast_env.vehicles.driving_steps import NEVER, IntArray32, Labels
 
 
-@njit(cache=True)
+@compiled()
 def spread(
     is_open: BoolArray,
     is_wide: BoolArray,
@@ -117,7 +117,7 @@ def spread(
                             changed[other, up, right] = True
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _is_passed(is_open: BoolArray, row: int, column: int, x: int, y: int) -> bool:
     """Return whether a place beside the middle of a straight step is open."""
     if abs(x) == 2:
@@ -127,7 +127,7 @@ def _is_passed(is_open: BoolArray, row: int, column: int, x: int, y: int) -> boo
     return True
 
 
-@njit(cache=True)
+@compiled()
 def fastest_into(
     run_up_m: Labels,
     among: BoolArray,

@@ -10,9 +10,10 @@ import numpy as np
 from numba import njit
 
 from blast_env.arrays import BoolArray, IntArray
+from blast_env.compilation import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def plane_of(boxes: IntArray, level: IntArray, half: int, end: int, step: int, axis: int) -> Any:
     """Return the cuts along an axis, and the places of the charge, rising.
 
@@ -44,7 +45,7 @@ def _with_ends(boxes: IntArray, axis: int, first: int, last: int) -> IntArray:
     return np.unique(found[:count])
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def reached_parts(
     x: IntArray, y: IntArray, closed: IntArray, solid: IntArray, starts: IntArray
 ) -> Any:

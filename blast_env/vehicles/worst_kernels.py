@@ -6,9 +6,10 @@ import numpy as np
 from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.compilation import compiled
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def chosen_places(
     places_m: FloatArray,
     distances_m: FloatArray,

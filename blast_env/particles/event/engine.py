@@ -4,9 +4,7 @@ It consists of a compiled loop from collision to collision, and the run that cal
 """
 
 from collections.abc import Callable
-from hashlib import sha256
 from math import inf, sqrt
-from pathlib import Path
 from threading import Lock
 from typing import Any, Final
 
@@ -14,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.compilation import compilation_notice
+from blast_env.compilation import compilation_notice, compiled
 from blast_env.particles.event.contacts import collide_balls, collide_with_module
 from blast_env.particles.event.prediction import (
     cell_at,
@@ -57,7 +55,7 @@ _NUMBER: Final[Any] = np.int64
 """Type of a ball's number, as in loops over them: a second integer type would compile twice."""
 
 
-@njit(error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def run_until(
     balls: RecordArray,
     cells: RecordArray,
@@ -237,53 +235,6 @@ def _can_reach(
 _FIRST_CALL: Final = Lock()
 
 
-def _source_digest() -> int:
-    """Return a number that changes with the source of the compiled code."""
-    digest = sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
-    return int.from_bytes(digest.digest()[:6])
-
-
-def _compiled(source_digest: int) -> Callable[..., int]:
-    @njit(cache=True, nogil=True, error_model="numpy")
-    def run(
-        balls: RecordArray,
-        cells: RecordArray,
-        heap: RecordArray,
-        surfaces: RecordArray,
-        modules: NDArray[np.int32],
-        loads: RecordArray,
-        targets: NDArray[np.float64],
-        rules: Record,
-        progress: Record,
-        record: NDArray[np.float64],
-        until_s: float,
-    ) -> int:
-        # Numba's disk cache is invalidated by changes of this file only. As a constant of this
-        # function, the digest of all files invalidates it too.
-        progress.source_digest = source_digest
-        return run_until(
-            balls,
-            cells,
-            heap,
-            surfaces,
-            modules,
-            loads,
-            targets,
-            rules,
-            progress,
-            record,
-            until_s,
-        )
-
-    function: Callable[..., int] = run
-    return function
-
-
-_RUN: Final[Any] = _compiled(_source_digest())
-
-
 def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
     """Continue until a time, or until the caller has to act; see `run_until`.
 
@@ -292,11 +243,11 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
     """
     answer = PAUSED
     while answer == PAUSED:
-        if _RUN.signatures:
-            answer = int(_RUN(*world, record, until_s))
+        if run_until.signatures:
+            answer = int(run_until(*world, record, until_s))
         else:
             with _FIRST_CALL, compilation_notice("the event engine (some 10 s)"):
-                answer = int(_RUN(*world, record, until_s))
+                answer = int(run_until(*world, record, until_s))
     return answer
 
 

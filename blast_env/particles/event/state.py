@@ -149,7 +149,6 @@ PROGRESS: Final = np.dtype(
         ("records", np.int64),  # rows written
         ("stage", np.int64),  # NEW, RUNNING or CHANGED
         ("looked_again", np.int64),  # with CHANGED: balls already predicted again
-        ("source_digest", np.int64),  # of the compiled code
     ]
 )
 
