@@ -1,0 +1,1 @@
+"""The atlas of shielding: blasts of a designed experiment, and the laws fitted to them."""

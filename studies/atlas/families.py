@@ -1,0 +1,363 @@
+"""Families of the atlas: which sites, with which obstacles, by which numbers.
+
+A family is a list of groups. A group is a site and several obstacles on it, so that the blast
+without an obstacle is run once. Sites and obstacles fill their ranges by scrambled Halton sequences
+with fixed seeds. All lengths are over the cube root of the mass, m/kg^(1/3).
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from studies.atlas.scenes import MODULES, Box, Scene
+
+Numbers = Mapping[str, float]
+Ranges = Mapping[str, tuple[float, float]]
+
+_NEAREST: Final = 4  # modules between the charge and a solid: what its source needs
+_WIDE: Final = 30  # modules of a facade: five bays
+
+
+def _modules(scaled: float, least: int = 1) -> int:
+    """Return a scaled length in whole modules."""
+    return max(round(scaled * MODULES), least)
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of surroundings.
+
+    Attributes:
+        name: Its name.
+        title: What it is, for readers.
+        site: Ranges of the numbers of a site.
+        obstacle: Ranges of the numbers of an obstacle.
+        obstacles: Number of obstacles of a group.
+        scenes: Returns the scenes of a group: a site's numbers, its obstacles' numbers; the first
+            scene is what the others are compared with.
+    """
+
+    name: str
+    title: str
+    site: Ranges
+    obstacle: Ranges
+    obstacles: int
+    scenes: Callable[[Numbers, list[Numbers]], list[Scene]]
+
+    def group(self, number: int) -> list[Scene]:
+        """Return the scenes of a group, by its number."""
+        seed = sum(self.name.encode())
+        (site,) = _points(self.site, seed, number, 1)
+        obstacles = _points(self.obstacle, seed + 1, number * self.obstacles, self.obstacles)
+        return self.scenes(site, obstacles)
+
+
+def _points(ranges: Ranges, seed: int, first: int, count: int) -> list[Numbers]:
+    """Return consecutive points of a scrambled Halton sequence in some ranges."""
+    from scipy.stats import qmc  # takes a while to import
+
+    if not ranges or not count:
+        return [{}] * count
+    sampler = qmc.Halton(len(ranges), scramble=True, seed=seed).fast_forward(first)
+    low, high = np.array([*ranges.values()]).T
+    drawn = low + (high - low) * sampler.random(count)
+    return [dict(zip(ranges, row.tolist(), strict=True)) for row in drawn]
+
+
+_FACADE: Final[Ranges] = {
+    "distance": (1.5, 5.0),
+    "facade_height": (0.5, 2.0),
+    "aside": (0.0, 1.2),
+    "raised": (-0.6, 0.4),
+}
+
+
+def _facade(site: Numbers, width: int = _WIDE) -> tuple[Box, Numbers, float]:
+    """Return the box of a facade, its numbers in whole modules, and the charge's height."""
+    distance, high = _modules(site["distance"]), _modules(site["facade_height"], 6)
+    aside = _modules(site["aside"], 0)
+    up = _modules(site.get("raised", 0.0), 0)
+    box = Box(distance, -width // 2 + aside, 4, width, high)
+    lengths = {"distance": distance, "facade_height": high, "aside": aside, "raised": up}
+    return box, {name: value / MODULES for name, value in lengths.items()}, float(up)
+
+
+def _scaled(**modules: float) -> dict[str, float]:
+    return {name: value / MODULES for name, value in modules.items()}
+
+
+def _wall(facade: Box, drawn: Numbers) -> tuple[Numbers, tuple[Box, ...]]:
+    """Return one wall, one with a gap, or two walls in a row."""
+    high = _modules(drawn["height"])
+    thick = _modules(drawn["thickness"])
+    length = _modules(drawn["length"], 4)
+    room = facade.x - thick - 1
+
+    def at(share: float) -> int:
+        return min(max(round(share * facade.x), _NEAREST), room)
+
+    x = at(drawn["share"])
+    left = round(drawn["shift"] * length) - length // 2
+    numbers = _scaled(
+        height=high, thickness=thick, length=length, from_charge=x, from_facade=facade.x - x - thick
+    )
+    if drawn["gap"] > 0.0:
+        gap = min(_modules(drawn["gap"]), length - 2)
+        first = min(max(round((0.5 + drawn["gap_at"]) * length) - gap // 2, 1), length - gap - 1)
+        parts = (
+            Box(x, left, thick, first, high),
+            Box(x, left + first + gap, thick, length - first - gap, high),
+        )
+        return {**numbers, **_scaled(gap=gap), "walls": 1.0}, parts
+    one = Box(x, left, thick, length, high)
+    if drawn["second"] > 0.0:
+        other = at(drawn["share"] + drawn["second"] * (1.0 - drawn["share"]))
+        if other > x + thick + 1:
+            behind = Box(other, left, thick, length, high)
+            return {**numbers, "gap": 0.0, "walls": 2.0}, (one, behind)
+    return {**numbers, "gap": 0.0, "walls": 1.0}, (one,)
+
+
+_WALL: Final[Ranges] = {
+    "height": (0.08, 1.5),
+    "share": (0.1, 0.95),
+    "length": (0.6, 4.5),
+    "shift": (-0.4, 0.4),
+    "thickness": (0.05, 0.3),
+    "gap": (-1.2, 0.5),
+    "gap_at": (-0.4, 0.4),
+    "second": (-3.0, 0.9),
+}
+
+
+def _walls(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        own, parts = _wall(box, drawn)
+        scenes.append(Scene({**numbers, **own}, box, others=parts, up=up))
+    return scenes
+
+
+def _raised(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a site with a raised charge, with one on the ground, then with walls."""
+    first, *others = _walls(site, obstacles)
+    ground = Scene({**first.numbers, "raised": 0.0, "on_ground": 1.0}, first.judged)
+    return [first, ground, *others]
+
+
+def _posts(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        size = _modules(drawn["size"])
+        pitch = max(round(size / drawn["solid"]), size + 1)
+        high = _modules(drawn["height"])
+        x = min(max(round(drawn["share"] * box.x), _NEAREST), box.x - size - 1)
+        count = max(round(drawn["length"] * MODULES / pitch), 2)
+        left = -(count * pitch - (pitch - size)) // 2 + round(drawn["shift"] * pitch)
+        parts = tuple(Box(x, left + k * pitch, size, size, high) for k in range(count))
+        own = _scaled(size=size, height=high, from_charge=x, from_facade=box.x - x - size)
+        more = {**own, "solid": size / pitch, **_scaled(length=count * pitch)}
+        scenes.append(Scene({**numbers, **more}, box, others=parts, up=up))
+    return scenes
+
+
+def _opposite(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        behind = _modules(drawn["behind"], _NEAREST)
+        high, length = _modules(drawn["height"], 2), _modules(drawn["length"], 6)
+        left = round(drawn["shift"] * length) - length // 2
+        other = Box(-behind - 4, left, 4, length, high)
+        own = _scaled(behind=behind, height=high, length=length)
+        scenes.append(Scene({**numbers, **own}, box, others=(other,), up=up))
+    return scenes
+
+
+_STREET_MODULES: Final = 66
+_STREET_BACK: Final = 12
+
+
+def _street(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a front along a street, alone, then with fronts on the other side, or a crossing."""
+    away, high = _modules(site["away"], _NEAREST), _modules(site["facade_height"], 6)
+    front = Box(-_STREET_BACK, away, _STREET_MODULES + _STREET_BACK, 4, high)
+    numbers = _scaled(away=away, facade_height=high)
+    scenes = [Scene(numbers, front, ("south",))]
+    for drawn in obstacles:
+        other, top = _modules(drawn["other"], _NEAREST), _modules(drawn["height"], 2)
+        whole = Box(front.x, -other - 4, front.depth, 4, top)
+        parts: tuple[Box, ...] = (whole,)
+        crossing = 0
+        if drawn["crossing"] > 0.0:
+            crossing = _modules(drawn["crossing"], 4)
+            at = _modules(drawn["crossing_at"])
+            first = at - whole.x
+            parts = (
+                Box(whole.x, whole.y, first, 4, top),
+                Box(at + crossing, whole.y, whole.depth - first - crossing, 4, top),
+            )
+        own = _scaled(other=other, height=top, width=away + other, crossing=crossing)
+        scenes.append(Scene({**numbers, **own}, front, ("south",), parts))
+    return scenes
+
+
+def _tee(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a facade across the end of a street, alone, then with the street's fronts."""
+    box, numbers, _ = _facade({**site, "aside": 0.0})
+    scenes = [Scene(numbers, box)]
+    for drawn in obstacles:
+        half = _modules(0.5 * drawn["width"], _NEAREST)
+        high = _modules(drawn["height"], 2)
+        end = box.x - min(_modules(drawn["across"]), box.x - 2)
+        fronts = (
+            Box(-_STREET_BACK, half, end + _STREET_BACK, 4, high),
+            Box(-_STREET_BACK, -half - 4, end + _STREET_BACK, 4, high),
+        )
+        parts = fronts if drawn["sides"] < 0.7 else fronts[:1]
+        own = {
+            **_scaled(width=2 * half, height=high, across=box.x - end),
+            "sides": float(len(parts)),
+        }
+        scenes.append(Scene({**numbers, **own}, box, others=parts))
+    return scenes
+
+
+def _court(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a facade alone, then with wings that reach forward at one end or both."""
+    width = 2 * _modules(0.5 * site["width"], 6)
+    reach = width // 2 - _NEAREST
+    aside = site["aside"] * reach / MODULES
+    box, numbers, _ = _facade({**site, "aside": abs(aside)}, width)
+    scenes = [Scene({**numbers, "width": width / MODULES}, box)]
+    for drawn in obstacles:
+        depth = _modules(drawn["depth"], 2)
+        high = _modules(drawn["height"], 2)
+        wings = (
+            Box(box.x - depth, box.y - 6, depth, 6, high),
+            Box(box.x - depth, box.y + box.width, depth, 6, high),
+        )
+        parts = wings if drawn["sides"] < 0.6 else wings[: 1 if drawn["sides"] < 0.8 else None][-1:]
+        own = {**_scaled(width=width, depth=depth, height=high), "sides": float(len(parts))}
+        scenes.append(Scene({**numbers, **own}, box, others=parts))
+    return scenes
+
+
+def _shadow(site: Numbers, _: list[Numbers]) -> list[Scene]:
+    """Return a block with loads on all of its walls."""
+    distance, high = _modules(site["distance"]), _modules(site["height"], 6)
+    depth, width = _modules(site["depth"], 6), _modules(site["width"], 6)
+    aside = _modules(site["aside"], 0)
+    box = Box(distance, -width // 2 + aside, depth, width, high)
+    numbers = _scaled(distance=distance, height=high, depth=depth, width=width, aside=aside)
+    return [Scene(numbers, box, ("west", "east", "south", "north"))]
+
+
+def _rows(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a facade alone, then behind a house, or behind two with a gap between them."""
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        high, length = _modules(drawn["height"], 3), _modules(drawn["length"], 6)
+        room = box.x - _NEAREST - 2
+        depth = min(_modules(drawn["depth"], 4), room)
+        x = _NEAREST + round(drawn["share"] * (room - depth))
+        left = round(drawn["shift"] * length) - length // 2
+        gap = _modules(drawn["gap"], 0)
+        parts: tuple[Box, ...] = (Box(x, left, depth, length, high),)
+        if gap > 1:
+            parts = (*parts, Box(x, left + length + gap, depth, length, high))
+        own = _scaled(
+            height=high,
+            depth=depth,
+            length=length,
+            from_charge=x,
+            from_facade=box.x - x - depth,
+            gap=gap if len(parts) > 1 else 0,
+        )
+        scenes.append(Scene({**numbers, **own, "houses": float(len(parts))}, box, others=parts))
+    return scenes
+
+
+def _canopy(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a facade alone, then with a canopy, storeys that project, or a podium before it."""
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        depth = min(_modules(drawn["depth"]), box.x - _NEAREST)
+        level = min(max(round(drawn["level"] * box.top), 3), box.top - 1)
+        x = box.x - depth
+        top, base, kind = level + 1, level, 0.0
+        if drawn["kind"] > 1.0:
+            top, base, kind = (box.top, level, 1.0) if drawn["kind"] < 2.0 else (level, 0, 2.0)
+        own = {**_scaled(depth=depth, level=level), "kind": kind}
+        other = Box(x, box.y, depth, box.width, top, base)
+        scenes.append(Scene({**numbers, **own}, box, others=(other,), up=up))
+    return scenes
+
+
+def _table() -> Iterator[Family]:
+    near = {**_FACADE, "distance": (1.3, 4.0)}
+    level = {name: own for name, own in near.items() if name != "raised"}
+    yield Family("wall", "a wall before a facade", _FACADE, _WALL, 12, _walls)
+    posts = {
+        "solid": (0.2, 0.85),
+        "size": (0.05, 0.3),
+        "height": (0.08, 0.8),
+        "share": (0.1, 0.9),
+        "length": (1.0, 4.5),
+        "shift": (-0.5, 0.5),
+    }
+    yield Family("posts", "posts or planters in a row", _FACADE, posts, 8, _posts)
+    opposite = {
+        "behind": (0.3, 2.5),
+        "height": (0.15, 2.0),
+        "length": (0.6, 5.0),
+        "shift": (-0.4, 0.4),
+    }
+    yield Family("opposite", "a front behind the charge", near, opposite, 7, _opposite)
+    fronts = {
+        "other": (0.3, 1.5),
+        "height": (0.2, 2.0),
+        "crossing": (-1.5, 1.0),
+        "crossing_at": (0.3, 2.5),
+    }
+    along = {"away": (0.33, 1.4), "facade_height": (0.5, 2.0)}
+    yield Family("street", "a front along a street", along, fronts, 5, _street)
+    tee = {"width": (0.7, 2.6), "height": (0.2, 2.0), "across": (0.1, 1.5), "sides": (0.0, 1.0)}
+    ends = {name: level[name] for name in ("distance", "facade_height")}
+    yield Family("tee", "a facade across the end of a street", ends, tee, 5, _tee)
+    wings = {"depth": (0.2, 2.0), "height": (0.3, 1.6), "sides": (0.0, 1.0)}
+    court = {**level, "distance": (0.9, 3.5), "width": (1.0, 2.6), "aside": (-1.0, 1.0)}
+    yield Family("court", "a court or a re-entrant corner", court, wings, 6, _court)
+    shadow = {
+        "distance": (1.3, 4.0),
+        "height": (0.5, 2.2),
+        "depth": (0.5, 2.5),
+        "width": (0.5, 2.5),
+        "aside": (0.0, 1.2),
+    }
+    yield Family("shadow", "the walls of a block out of sight", shadow, {}, 0, _shadow)
+    rows = {
+        "height": (0.3, 1.6),
+        "depth": (0.4, 1.6),
+        "length": (0.6, 2.5),
+        "share": (0.0, 1.0),
+        "shift": (-0.8, 0.8),
+        "gap": (-0.8, 0.8),
+    }
+    second = {**_FACADE, "distance": (2.0, 5.0)}
+    yield Family("rows", "a second row of houses", second, rows, 7, _rows)
+    canopy = {"depth": (0.1, 1.2), "level": (0.25, 0.9), "kind": (0.0, 3.0)}
+    yield Family("canopy", "a canopy, storeys that project, a podium", near, canopy, 6, _canopy)
+    raised = {**_FACADE, "raised": (0.05, 1.2)}
+    yield Family("raised", "a raised charge, without and with a wall", raised, _WALL, 5, _raised)
+
+
+FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _table()})
+"""The families by name."""

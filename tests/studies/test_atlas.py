@@ -1,0 +1,61 @@
+"""The atlas of shielding: its designed experiment, and how it is run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blast_env.units import MODULE_SIDE_M
+from studies.atlas.families import FAMILIES
+from studies.atlas.runs import groups_in, rounds, run_group
+from studies.atlas.scenes import CUBE_ROOT, Box, Scene, scaled_impulse
+
+
+def test_loads_follow_hopkinson_and_cranz() -> None:
+    """A wall before a facade, for 216 kg and in half the size for 27 kg."""
+    scene = Scene({}, Box(18, -8, 4, 16, 8), others=(Box(8, -6, 2, 12, 4),))
+    whole = scaled_impulse(scene, MODULE_SIDE_M, CUBE_ROOT)
+    half = scaled_impulse(scene, 0.5 * MODULE_SIDE_M, 0.5 * CUBE_ROOT)
+    assert half == pytest.approx(whole, rel=0.01)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_family_fills_its_ranges_with_sites_that_can_be_built(name: str) -> None:
+    family = FAMILIES[name]
+    for number in (0, 7):
+        scenes = family.group(number)
+        assert len(scenes) >= family.obstacles
+        assert [scene.described() for scene in scenes] == [
+            scene.described() for scene in family.group(number)
+        ]
+        for scene in scenes:
+            site = scene.scenario()
+            assert site.structures[0].protected
+            assert site.charge[0].tnt_kg == pytest.approx(216.0)
+    key = "distance" if "distance" in family.site else "away"
+    low, high = family.site[key]
+    found = [family.group(group)[0].numbers[key] for group in range(16)]
+    assert np.ptp(np.array(found)) > 0.6 * (high - low)
+
+
+def test_runs_go_on_where_they_stopped(tmp_path: Path) -> None:
+    assert run_group("shadow", 3, False, tmp_path) == 1
+    assert run_group("shadow", 3, False, tmp_path) == 0
+    ((found,),) = ([group["scenes"][0]] for group in groups_in(tmp_path))
+    impulse = dict(zip(found["bays"], found["impulse"], strict=True))
+    front, back = (
+        np.mean([own for bay, own in impulse.items() if f"/{wall}/" in bay])
+        for wall in ("west", "east")
+    )
+    assert 0.1 < back / front < 0.4
+
+
+def test_families_take_turns() -> None:
+    asked = [*rounds(["wall", "posts"], 2)]
+    assert [own for own in asked if not own[2]] == [
+        ("wall", 0, False),
+        ("posts", 0, False),
+        ("wall", 1, False),
+        ("posts", 1, False),
+    ]
+    assert [own for own in asked if own[2]] == [("wall", 0, True), ("posts", 1, True)]
