@@ -42,7 +42,8 @@ def put_vectors(
         for index in range(first):
             vector[index] = min(max(shares[episode, index], 0.0), 1.0)
         at = first
-        vector[at : at + of_site] = known[:of_site]
+        for index in range(of_site):  # slices would compile NumPy's messages too
+            vector[at + index] = known[index]
         at += of_site
         stands, is_free = vector[at : at + cells], vector[at + cells : at + 2 * cells]
         for cell in range(cells):
@@ -52,7 +53,8 @@ def put_vectors(
             for cell in range(cells):
                 is_free[cell] = max(is_free[cell], np.float32(legal[episode, kind, cell]))
         at += 2 * cells
-        vector[at : at + len(known) - of_site] = known[of_site:]
+        for index in range(of_site, len(known)):
+            vector[at + index - of_site] = known[index]
         at += len(known) - of_site
         if has_items:
             for index in range(items):

@@ -197,7 +197,8 @@ def first_sums(rows: SingleArray, weights: SingleArray, bias: SingleArray) -> Si
     found = np.empty((members, rows.shape[1], outputs), dtype=np.float32)
     for member in range(members):
         for row in range(rows.shape[1]):
-            found[member, row] = bias[member]
+            for output in range(outputs):  # a slice would compile NumPy's messages too
+                found[member, row, output] = bias[member, output]
             for index in range(inputs):
                 value = rows[member if len(rows) > 1 else 0, row, index]
                 for output in range(outputs):
