@@ -32,7 +32,7 @@ multiprocessing.get_start_method()
 
 
 # The same examples every time; "many" draws others, and finds what these do not.
-hypothesis.settings.register_profile("quick", max_examples=15, deadline=None, derandomize=True)
+hypothesis.settings.register_profile("quick", max_examples=10, deadline=None, derandomize=True)
 hypothesis.settings.register_profile("many", max_examples=2000, deadline=None)
 hypothesis.settings.load_profile("quick")
 
