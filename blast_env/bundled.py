@@ -14,8 +14,14 @@ ITEM_SITES: Final = "item_sites"
 LARGE_SITES: Final = "large_sites"
 """Name of such sites of real size."""
 
+KERB_SITES: Final = "kerb_sites"
+"""Name of sites with a front along a kerb, of any size."""
+
+STREET_SITES: Final = "street_sites"
+"""Name of streets along which a vehicle drives, of any size."""
+
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
-"""All of them."""
+"""Those of an environment: all sites of a name have one size."""
 
 
 def bundled_scenarios() -> tuple[str, ...]:

@@ -9,19 +9,17 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.bundled import ITEM_SITES, LARGE_SITES
+from blast_env.bundled import LARGE_SITES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import OUTWARDS
 from blast_env.sites import (
     HELD_OUT_SITES,
-    ItemSiteRanges,
+    SITE_KINDS,
     close_ranges,
     generate_site,
-    kerb_site,
     large_ranges,
-    street_site,
 )
 
 CLOSE_SITES: Final = "close_sites"
@@ -29,12 +27,6 @@ CLOSE_SITES: Final = "close_sites"
 
 FRONT_SITES: Final = "front_sites"
 """Kind of close sites on which only the walls that face the charge count."""
-
-KERB_SITES: Final = "kerb_sites"
-"""Kind of `kerb_site`, of any size."""
-
-STREET_SITES: Final = "street_sites"
-"""Kind of `street_site`, of any size."""
 
 _LEAST_SEEN_M: Final = 1.0
 """Distance of the charge in front of a wall beyond which the wall faces it."""
@@ -45,8 +37,8 @@ def scenario_of(name: str) -> Scenario:
 
     Args:
         name: A bundled scenario, or the KIND/SEED of a generated site, where the kind is
-            `item_sites`, `kerb_sites`, `street_sites`, or one of `close_sites/18`, `front_sites/18`
-            and `large_sites/60` with the side in m.
+            one of `SITE_KINDS`, or of `close_sites/18`, `front_sites/18` and `large_sites/60` with
+            the side in m.
 
     Raises:
         BlastEnvError: If there is no such scenario or kind, or as `generate_site`.
@@ -90,8 +82,8 @@ def site_names(kinds: Iterable[str], first: int, count: int) -> list[str]:
 def _maker(kind: str) -> Callable[[int], Scenario]:
     """Return what makes the sites of a kind from their seeds."""
     family, _, side = kind.partition("/")
-    if not side and family in _UNSIZED:
-        return _UNSIZED[family]
+    if not side and family in SITE_KINDS:
+        return SITE_KINDS[family]
     if side and family in _SIZED:
         try:
             side_m = float(side)
@@ -101,12 +93,8 @@ def _maker(kind: str) -> Callable[[int], Scenario]:
         return lambda seed: of_side(seed, side_m)
     sized = (f"{name}/SIDE" for name in _SIZED)
     raise BlastEnvError(
-        f"kind of sites is {kind!r}, must be one of {', '.join((*_UNSIZED, *sized))}"
+        f"kind of sites is {kind!r}, must be one of {', '.join((*SITE_KINDS, *sized))}"
     )
-
-
-def _item_site(seed: int) -> Scenario:
-    return generate_site(seed, ItemSiteRanges())
 
 
 def _close_site(seed: int, side_m: float) -> Scenario:
@@ -134,9 +122,6 @@ def _front_site(seed: int, side_m: float) -> Scenario:
     return site.model_copy(update={"structures": tuple(structures)})
 
 
-_UNSIZED: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
-    {ITEM_SITES: _item_site, KERB_SITES: kerb_site, STREET_SITES: street_site}
-)
 _SIZED: Final[Mapping[str, Callable[[int, float], Scenario]]] = MappingProxyType(
     {CLOSE_SITES: _close_site, FRONT_SITES: _front_site, LARGE_SITES: _large_site}
 )

@@ -19,7 +19,7 @@ from blast_env.evaluation.cases import (
 )
 from blast_env.layout.build_site import draw_threat
 from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
-from blast_env.sites import FAMILIES, generate_site
+from blast_env.sites import SITE_KINDS
 from blast_env.values import whole_number
 
 Family = Literal["known", "hidden", "vehicle", "unseen", "response"]
@@ -42,10 +42,8 @@ _JUDGED_UNSEEN: Final = 2
 _DRAWS: Final = 16
 """Draws that find every place where the site has only a few."""
 
-_GENERATED: Final = MappingProxyType(
-    {"site": ITEM_SITES, **{family: family for family in FAMILIES}}
-)
-"""The family of generated sites by the first part of their names; the seed follows."""
+_GENERATED: Final = MappingProxyType({"site": SITE_KINDS[ITEM_SITES], **SITE_KINDS})
+"""What makes a generated site from its seed, by the first part of its name; the seed follows."""
 
 MOST_PLACES: Final = 1000
 """Most known charges of one site."""
@@ -61,7 +59,7 @@ class Definition:
     """Definition of a problem. It never changes; a changed problem is a new version.
 
     Attributes:
-        site: Bundled name, path, or FAMILY_SEED for a generated site, such as `sites_3`;
+        site: Bundled name, path, or KIND_SEED for a generated site, such as `sites_3`;
             `site_SEED` is one with heights and a catalogue.
         family: Knowledge of the charge.
         place: Number of the charge in the family `known`, from 1: one of each of the site's sources
@@ -85,7 +83,7 @@ class Definition:
         """The site."""
         family, _, seed = self.site.rpartition("_")
         if family in _GENERATED and seed.isdecimal():
-            return generate_site(int(seed), FAMILIES[_GENERATED[family]])
+            return _GENERATED[family](int(seed))
         return load_scenario(self.site)
 
     @cached_property
@@ -179,8 +177,8 @@ def site_problems(
     """Return problems on a site of any scenario file, or on generated sites.
 
     Args:
-        scenario: Bundled name or path, or a family of generated sites, for a problem on each of the
-            first sites held out from training.
+        scenario: Bundled name or path, or a kind of generated sites (`SITE_KINDS`), for a
+            problem on each of the first sites held out from training.
         most: Largest number of charges, each a problem, or of sites. Fixed charges count once each.
         is_hidden: Whether one problem has all charges of a site instead.
 
@@ -189,7 +187,7 @@ def site_problems(
     """
     site = str(scenario)
     count = whole_number("cases", most, 1, MOST_PLACES)
-    if site in FAMILIES:
+    if site in SITE_KINDS:
         kind: Family = "unseen" if is_hidden else "known"
         return tuple(Definition(f"{site}_{seed}", kind) for seed in range(count))
     found = Definition(site, "vehicle" if is_hidden else "known")

@@ -63,8 +63,8 @@ def judge(
     ),
     scenario: list[str] = typer.Option(
         [],
-        help="Your own site in the place of problems: a file, a bundled name, or sites, item_sites "
-        "or large_sites for generated ones; may be given again.",
+        help="Your own site in the place of problems: a file, a bundled name, or for generated "
+        "ones sites, item_sites, large_sites, kerb_sites or street_sites; may be given again.",
     ),
     threat: str = typer.Option(
         "visible",

@@ -28,7 +28,13 @@ if TYPE_CHECKING:
     from blast_env.sites.kerb_sites import KerbSiteRanges, kerb_site, street_site
     from blast_env.sites.module_sites import SiteRanges
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
-    from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, SiteSource, training_sites
+    from blast_env.sites.source import (
+        FAMILIES,
+        HELD_OUT_SITES,
+        SITE_KINDS,
+        SiteSource,
+        training_sites,
+    )
     from blast_env.sites.turning import turned
 else:
     __getattr__, __dir__ = on_first_use(__name__)
@@ -42,6 +48,7 @@ __all__ = [
     "LARGE_SITES",
     "POST",
     "SITES",
+    "SITE_KINDS",
     "TARGETS",
     "Draws",
     "ItemSiteRanges",

@@ -1,25 +1,35 @@
 """Sites for an environment: disjoint sets of seeds for training and evaluation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
-from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
+from blast_env.bundled import ITEM_SITES, KERB_SITES, LARGE_SITES, SITES, STREET_SITES
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import MOST_SEED, RANGES, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
+from blast_env.sites.kerb_sites import kerb_site, street_site
 from blast_env.sites.ranges import Ranges
 
 FAMILIES: Final[Mapping[str, Ranges]] = MappingProxyType(
     {SITES: RANGES, ITEM_SITES: ItemSiteRanges(), LARGE_SITES: large_ranges()}
 )
 """The named families of generated sites."""
+
+SITE_KINDS: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
+    {
+        **{name: partial(generate_site, ranges=ranges) for name, ranges in FAMILIES.items()},
+        KERB_SITES: kerb_site,
+        STREET_SITES: street_site,
+    }
+)
+"""What makes a site from its seed, by the name of its kind: the families, and kinds of any size."""
 
 HELD_OUT_SITES: Final = 10_000
 """Number of held-out seeds, 0 to 9,999; training uses the seeds from 10,000."""

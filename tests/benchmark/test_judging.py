@@ -1,6 +1,7 @@
 """Scores between best rule and best known; what was submitted is played again."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +30,8 @@ from blast_env.cli import app
 from blast_env.cli.judge import _Judging
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
+from blast_env.site import Scenario
+from blast_env.sites import kerb_site, street_site
 from tests.benchmark.row import RowEngine
 
 NAME = "control_room-known-v2"
@@ -223,6 +226,14 @@ def test_fixed_charges_of_ones_own_site_are_problems_once_each(most: int, places
     assert len(set(charges)) == places
     (hidden,) = site_problems("control_room", is_hidden=True)
     assert set(hidden.case.charges) == set(charges) or most == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "made"), [("kerb_sites", kerb_site), ("street_sites", street_site)]
+)
+def test_sites_of_any_size_are_problems_too(kind: str, made: Callable[[int], Scenario]) -> None:
+    found = site_problems(kind, 2)
+    assert [site_problem.scenario for site_problem in found] == [made(0), made(1)]
 
 
 def test_charges_on_a_line_are_drawn_at_different_places() -> None:

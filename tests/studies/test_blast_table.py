@@ -61,7 +61,7 @@ def test_generated_sites_of_all_kinds_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("item_sites/16/3", "kind of sites is 'item_sites/16', must be one of item_sites, kerb_"),
+        ("item_sites/16/3", "kind of sites is 'item_sites/16', must be one of sites, item_sites"),
         ("close_sites/3", "kind of sites is 'close_sites'"),
         ("front_sites/wide/3", "'wide' is no side in m"),
         ("close_sites/30/3", "side_m is 30, must be 16 to 24"),
