@@ -59,7 +59,7 @@ def test_a_given_size_is_that_of_every_site() -> None:
 
 def test_a_vehicle_of_a_street_drives_along_the_front() -> None:
     for site in map(street_site, SEEDS[:6]):
-        (source,) = site.charge
+        (source,) = site.vehicles
         (road,) = source.drivable
         front = next(structure for structure in site.structures if structure.protected)
         gaps_m = [
