@@ -1,4 +1,4 @@
-"""An episode of `BlastBarrier-v0`: random legal places for barriers, then the blast."""
+"""An episode of `BlastBarrier-v0`: random places for barriers, then the blast."""
 
 import gymnasium as gym
 
@@ -9,7 +9,7 @@ observation, info = env.reset(seed=0)
 env.action_space.seed(0)
 reward, ended = 0.0, False
 while not ended:
-    action = env.action_space.sample(mask=info["action_mask"])  # a free cell, or "finish"
+    action = env.action_space.sample()  # item, row and column; the nearest legal cell is taken
     observation, reward, terminated, truncated, info = env.step(action)
     ended = terminated or truncated
 

@@ -270,8 +270,8 @@ def environment_cost(
     """Time one environment, and several in one batch.
 
     Args:
-        chosen: Arguments of `gymnasium.make`. The scenario needs a build zone, and a calibration
-            where the engine does.
+        chosen: Arguments of `gymnasium.make`, with `action="place"`. The scenario needs a build
+            zone, and a calibration where the engine does.
         episodes: Number of timed episodes, after one to warm up.
         environments: Number of environments in the batch.
         memory: Whether to measure the memory of the batch, too, in a separate process.
@@ -378,7 +378,12 @@ def _print_environments(
     rows, left_out = [], []
     for scenario, engine in pairs:
         for observation in ("features", "image"):
-            chosen = {"scenario": scenario, "engine": engine, "observation": observation}
+            chosen = {
+                "scenario": scenario,
+                "engine": engine,
+                "observation": observation,
+                "action": "place",
+            }
             try:
                 cost = environment_cost(chosen, repeats, environments, memory=memory)
             except BlastEnvError as error:

@@ -90,7 +90,13 @@ def main(
             agent = load_agent(run)
         kinds = KINDS if agent is not None else KINDS[:-1]
         whole_number("episodes", episodes, len(kinds), 1_000_000)
-        env = gym.make("BlastBarrier-v0", scenario=scenario, engine=engine, observation="features")
+        env = gym.make(
+            "BlastBarrier-v0",
+            scenario=scenario,
+            engine=engine,
+            observation="features",
+            action="place",
+        )
         collector = DataCollector(env, record_infos=True)
         with progress_bar("episodes") as progress:
             found = record(collector, episodes, kinds, agent, progress)

@@ -80,6 +80,7 @@ def batch(scenario: Any, observation: str = "features", warm_up: int = _STEPS) -
         scenario=scenario,
         engine=_guesses(),
         observation=observation,
+        action="place",
     )
     rng = np.random.default_rng(0)
     _, info = envs.reset(seed=0)
@@ -109,7 +110,13 @@ def single(scenario: str) -> Measure:
 
     import blast_env  # noqa: F401  # registers the environments
 
-    env = gym.make("BlastBarrier-v0", scenario=scenario, engine=_guesses(), observation="features")
+    env = gym.make(
+        "BlastBarrier-v0",
+        scenario=scenario,
+        engine=_guesses(),
+        observation="features",
+        action="place",
+    )
     rng, over, mask = np.random.default_rng(0), True, np.zeros(0)
     env.reset(seed=0)
 

@@ -61,7 +61,7 @@ def surrogate() -> None:
     Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
     solid_relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
     envs = BlastBarrierVectorEnv(
-        2, scenario="control_room", engine=SurrogateEngine(), observation="features"
+        2, scenario="control_room", engine=SurrogateEngine(), observation="features", action="place"
     )
     _, info = envs.reset(seed=0)
     for _ in range(6):

@@ -380,7 +380,7 @@ def test_a_drawing_has_the_zone_on_the_terrace_that_it_lies_wholly_on(tmp_path: 
 
 
 def test_planes_show_tops_of_structures_and_heights_of_pieces() -> None:
-    env = gym.make("BlastBarrierGas-v0", scenario=terraced(), observation="grid")
+    env = gym.make("BlastBarrierGas-v0", scenario=terraced(), observation="grid", action="place")
     env.reset(seed=0)
     catalogue = LayoutState.empty(terraced()).catalogue
     planes = env.step(catalogue.action(WALL[0]))[0]

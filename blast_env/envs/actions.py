@@ -24,6 +24,10 @@ class ActionCode(Protocol):
     def space(self) -> spaces.Space[Any]:
         """The space of one action."""
 
+    @property
+    def finish(self) -> Any:
+        """The action that finishes."""
+
     def numbers(self, actions: NDArray[np.int64]) -> IntArray:
         """Return the numbers of actions of the space (actions,)."""
 
@@ -46,6 +50,11 @@ class Numbers:
         """`Discrete`."""
         return spaces.Discrete(self.count)
 
+    @property
+    def finish(self) -> Any:
+        """The last number."""
+        return self.count - 1
+
     def numbers(self, actions: NDArray[np.int64]) -> IntArray:
         """Return the actions."""
         return actions
@@ -57,14 +66,17 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """An action is a variant, or the end, with a row and a column, each chosen by itself.
+    """An action is a variant with a row, or the end, and a column, each chosen by itself.
+
+    The end is among the rows, of which there are many: a policy that has learnt nothing yet then
+    places most of the stock. Among few variants it would finish after one or two.
 
     A mask says of each dimension which values some legal action has, one after the other, as
     MaskablePPO takes it. Values that are legal one by one may be illegal together.
 
     Attributes:
-        variants: Number of variants; this number itself finishes.
-        rows: Number of rows of the build zone.
+        variants: Number of variants.
+        rows: Number of rows of the build zone; this number itself finishes.
         columns: Number of its columns.
     """
 
@@ -75,25 +87,31 @@ class Dimensions:
     @property
     def space(self) -> spaces.Space[Any]:
         """`MultiDiscrete`."""
-        return spaces.MultiDiscrete([self.variants + 1, self.rows, self.columns])
+        return spaces.MultiDiscrete([self.variants, self.rows + 1, self.columns])
+
+    @property
+    def finish(self) -> Any:
+        """The last row, with the first variant and column."""
+        return np.array([0, self.rows, 0])
 
     def numbers(self, actions: NDArray[np.int64]) -> IntArray:
         """Return the numbers of actions (actions, 3) among placements row by row; the last ends."""
         variant, row, column = actions.T
         placed = (variant * self.rows + row) * self.columns + column
-        numbers: IntArray = np.minimum(placed, self.variants * self.rows * self.columns)
+        end = self.variants * self.rows * self.columns
+        numbers: IntArray = np.where(row == self.rows, end, placed)
         return numbers
 
     def masks(self, legal: NDArray[np.int8]) -> NDArray[np.int8]:
-        """Return the masks (actions, variants + 1 + rows + columns).
+        """Return the masks (actions, variants + rows + 1 + columns).
 
-        Where nothing can be placed, any row and column go with the end.
+        Where nothing can be placed, any variant and column go with the end.
         """
         places = legal[:, :-1].reshape(-1, self.variants, self.rows, self.columns)
-        of_variants = np.hstack((places.any(axis=(2, 3)), legal[:, -1:]))
-        nothing = ~places.any(axis=(1, 2, 3), keepdims=True).reshape(-1, 1)
-        of_rows, of_columns = places.any(axis=(1, 3)), places.any(axis=(1, 2))
-        return np.hstack((of_variants, of_rows | nothing, of_columns | nothing)).astype(np.int8)
+        nothing = ~places.any(axis=(1, 2, 3)).reshape(-1, 1)
+        of_variants, of_columns = places.any(axis=(2, 3)), places.any(axis=(1, 2))
+        of_rows = np.hstack((places.any(axis=(1, 3)), legal[:, -1:]))
+        return np.hstack((of_variants | nothing, of_rows, of_columns | nothing)).astype(np.int8)
 
 
 class Actions(Protocol):
@@ -133,16 +151,12 @@ class PlaceAtOnce(_Numbered):
 
 
 @dataclass(frozen=True)
-class PlaceByDimensions:
-    """The same placements as `PlaceAtOnce`, as a vector: the variant or the end, row, column.
+class PlaceByDimensions(PlaceAtOnce):
+    """The same placements as a vector: the variant, the row or the end, and the column.
 
     Policies of libraries draw each number by itself: some dozens of outputs take the place of
     thousands, and what is learnt of a row holds for all columns.
     """
-
-    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
-        """Return the only choice, that of `PlaceAtOnce`."""
-        return PlaceAtOnce().choices(scenario)
 
     def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
         """Return the three numbers of a placement."""
@@ -345,6 +359,10 @@ class ActionNumbers:
     def _beside_m(self) -> FloatArray:
         return _sight(self.scenario, self.sources).beside_m(self.scenario)
 
+    @cached_property
+    def _is_sight_along_x(self) -> bool:
+        return _sight(self.scenario, self.scenario.charge).is_along_x
+
     def mask(self, chosen: ActionChoice) -> NDArray[np.bool_]:
         """Return the mask of legal actions (actions,); finishing is legal before the first choice.
 
@@ -400,9 +418,10 @@ class ActionNumbers:
     def nearest(self, chosen: ActionChoice, action: int) -> int | None:
         """Return the legal action nearest to an illegal one.
 
-        The nearest one leads to the legal placement of the same item whose lower left cell has the
-        least distance from the wanted one, or from the middle of several: in the same rotation, if
-        it has a legal placement. Of several at one distance the first one counts.
+        It leads to the legal placement of the same item whose lower left cell is nearest to the
+        wanted one, or to the middle of several: in the same rotation, if it has a legal placement.
+        Distances along the line of sight count first, then those across it. So what an agent
+        repeats becomes a wall, not a heap. Of several at one distance the first one counts.
 
         Args:
             chosen: The choices so far.
@@ -420,7 +439,9 @@ class ActionNumbers:
         if not len(numbers):
             return None
         up, right = np.indices(self.catalogue.shape)
-        distances = (up - rows.mean()) ** 2 + (right - columns.mean()) ** 2
+        beside = np.abs(up - rows.mean()), np.abs(right - columns.mean())
+        across, along = beside if self._is_sight_along_x else beside[::-1]
+        distances = along * max(self.catalogue.shape) + across
         items = np.array([variant.item for variant in self.catalogue.variants])
         same_rotation = np.isin(np.arange(len(items)), numbers)
         for suits in (same_rotation, np.isin(items, items[numbers])):

@@ -115,7 +115,12 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):  # type: ignore[misc]  # unt
     ) -> None:
         super().__init__()
         self.placing = BlastBarrierEnv(
-            scenario, observation="features", threat="hidden", threats=1, engine=_NoBlast()
+            scenario,
+            observation="features",
+            action="place",
+            threat="hidden",
+            threats=1,
+            engine=_NoBlast(),
         )
         self.scenario = self.placing.task.source.representative
         self.evaluator = BlastEvaluator(self.scenario, engine, cache=cache)

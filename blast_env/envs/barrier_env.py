@@ -1,5 +1,6 @@
 """The environment `BlastBarrier-v0`: placing barriers to protect a structure."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
     from blast_env.envs.display import Display
 
 
-class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
+class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
     """Barriers are placed one by one, then a charge goes off, by default in the paper's model.
 
     ## Description
@@ -59,15 +60,19 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     the charge goes off. The smaller the impulse on the protected structures, the better the layout.
 
     ## Action space
-    `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
-    orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
-    action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
-    legal. With `action="dimensions"` it is `MultiDiscrete([variants + 1, rows, columns])`, where
-    the last variant finishes. With `"item_then_place"` or `"item_then_block"` the variant comes
-    before the cell.
-    `action="row"` has few actions: a variant and a row across the line of sight, whose legal place
-    nearest to the line is taken.
-    An illegal action places the same item on the nearest legal cell (`invalid_action="nearest"`).
+    `MultiDiscrete([variants, rows + 1, columns])`: the variant, and row and column of its lower
+    left cell. A variant is an item of the catalogue in one orientation, or a module of 0.5 m. Rows
+    count from the lower edge of the build zone; the last one finishes, as `finish` does. An illegal
+    action places the same item on the nearest legal cell, across the line of sight if there is one
+    (`invalid_action="nearest"`): what is repeated becomes a wall.
+    `action_masks()` and `info["action_mask"]` have the values that some legal placement has,
+    dimension after dimension. `explain(element)` says why a placement is not legal.
+
+    `action="place"` numbers the same placements, variant by variant and row by row, and last the
+    end: `Discrete(variants * rows * columns + 1)`, with the mask of the legal ones. Other spaces
+    are `Discrete`, too. `"row"` has few actions: a variant and a row across the line of sight,
+    whose legal place nearest to the line is taken. With `"item_then_place"` or `"item_then_block"`
+    the variant comes before the cell.
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
@@ -101,12 +106,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})
     >>> observation.shape, env.action_space
-    ((60, 80, 9), Discrete(641))
+    ((60, 80, 9), MultiDiscrete([ 1 41 16]))
     >>> env.unwrapped.explain((18, 3))
     'cell (18, 3) must stay empty: the path from the road to the door must stay open'
     >>> for row in (10, 12, 14, 16, 22, 24, 26, 28):
     ...     for cell in ((row, 0), (row + 1, 0)):
-    ...         observation, reward, ended, _, info = env.step(cell[0] * 16 + cell[1])
+    ...         observation, reward, ended, _, info = env.step((0, *cell))
     >>> ended, info["reward_terms"]["impulse"] == info["reduction"] > 0.0
     (True, True)
 
@@ -129,7 +134,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         scenario: AnyScenario | ScenarioSource = "courtyard",
         reward: str | Reward | EndReward = "terminal",
         observation: str | Observation = "image",
-        action: str | Actions = "place",
+        action: str | Actions = "dimensions",
         threat: str | ThreatModel = "visible",
         threats: int | None = None,
         realisations: int | None = None,
@@ -150,7 +155,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, `"relative"`, or a `Reward` or `EndReward`.
             observation: `"image"`, `"grid"`, `"features"`, `"dict"`, or an `Observation`.
-            action: `"place"`, `"dimensions"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or
+            action: `"dimensions"`, `"place"`, `"row"`, `"item_then_place"`, `"item_then_block"`, or
                 `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.
@@ -227,7 +232,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         return self._observation(), self.episodes.information(0)
 
     def step(
-        self, action: np.int64 | int | IntArray
+        self, action: np.int64 | int | Sequence[int] | IntArray
     ) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Make a choice, place a module or a piece, or finish; see the class.
 
@@ -245,7 +250,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         self._show()
         return observation, reward, terminated, False, info
 
-    def _check(self, action: np.int64 | int | IntArray) -> None:
+    def _check(self, action: np.int64 | int | Sequence[int] | IntArray) -> None:
         if not self.action_space.contains(action):
             raise gym.error.InvalidAction(
                 f"action is {value_text(action)}, must be in {self.action_space}"
@@ -256,8 +261,13 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     def _observation(self) -> Any:
         return one_of(self.episodes.observe([0], self.observation_space), 0)
 
+    @property
+    def finish(self) -> Any:
+        """The action that finishes."""
+        return self.episodes.code.finish
+
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return the mask of actions that are legal now, (actions,); see `ActionCode.masks`.
+        """Return the mask of actions that are legal now, (length,); see `ActionCode.masks`.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.

@@ -1,5 +1,6 @@
 """The environment with two objectives, the load taken off and the cost of the barriers."""
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -42,7 +43,7 @@ class BlastBarrierTwoObjectivesEnv(BlastBarrierEnv):
         self.reward_space = spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
     def step(
-        self, action: np.int64 | int | IntArray
+        self, action: np.int64 | int | Sequence[int] | IntArray
     ) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Make a step, as `BlastBarrierEnv.step`, with the rewards of both objectives (2,)."""
         before = _spent_share(self.placement)

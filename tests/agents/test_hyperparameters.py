@@ -78,7 +78,7 @@ def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
 def archived(archive: Path, monkeypatch: pytest.MonkeyPatch, policy: str) -> PPO:
     """Write an untrained model as RL Zoo does, whose schedules are objects of its own classes."""
     (archive.parent / "elsewhere.py").write_text(ELSEWHERE)
-    environment = gym.make("BlastBarrier-v0", observation="grid")
+    environment = gym.make("BlastBarrier-v0", observation="grid", action="place")
     with monkeypatch.context() as installed:
         installed.syspath_prepend(archive.parent)
         module, _, attribute = policy.rpartition(".")

@@ -22,7 +22,7 @@ CHARGE = Charge((2.0, 6.0), 5.0)
 
 
 def yard_policy(width: int = 8) -> tuple[SpatialMaskablePolicy, BlastBarrierEnv]:
-    env = BlastBarrierEnv(scenario=yard(), engine="gas", observation="grid")
+    env = BlastBarrierEnv(yard(), observation="grid", action="place", engine="gas")
     torch.manual_seed(0)
     policy = SpatialMaskablePolicy(
         env.observation_space,

@@ -49,7 +49,9 @@ def configuration(scenario: Scenario, observation: str, policy: str | None) -> R
 
 def environment(scenario: Scenario, observation: str = "grid") -> BlastBarrierEnv:
     """Return an environment; nothing runs a blast here, so any engine will do."""
-    env = gym.make("BlastBarrierGas-v0", scenario=scenario, observation=observation).unwrapped
+    env = gym.make(
+        "BlastBarrierGas-v0", scenario=scenario, observation=observation, action="place"
+    ).unwrapped
     assert isinstance(env, BlastBarrierEnv)
     return env
 

@@ -36,7 +36,7 @@ SHARE_GAIN = 10.0  # what the features of shares of the facade are multiplied by
 
 def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
     env = gym.make(
-        "BlastBarrier-v0", scenario=scenario, engine="event", observation="grid"
+        "BlastBarrier-v0", scenario=scenario, engine="event", observation="grid", action="place"
     ).unwrapped
     assert isinstance(env, BlastBarrierEnv)
     return env

@@ -25,6 +25,7 @@ def environment() -> gym.Env:
     return gym.make(
         "BlastBarrier-v0",
         scenario=small_scenario(),
+        action="place",
         engine="event",
         realisations=1,
         disable_env_checker=True,

@@ -127,7 +127,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/researchers/training.md
     "python -m studies.cluster --engine surrogate": "--budget 8 --workers 1",
-    "python -m studies.first_hour --reward relative": (
+    "python -m studies.first_hour --reward relative --action row": (
         "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0"
     ),
     "python -m studies.first_hour --scenario control_room --engine surrogate --action dimensions"
@@ -235,7 +235,8 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m rl_zoo3.train --algo ppo --env BlastBarrier-v0 --gym-packages blast_env"
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
-    """ --env-kwargs 'engine:'"'"'event'"'"'' 'reward:'"'"'relative'"'"'' realisations:1"""
+    """ --env-kwargs 'engine:'"'"'event'"'"'' 'action:'"'"'place'"'"''"""
+    """ 'reward:'"'"'relative'"'"'' realisations:1"""
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python ppo.py --env-id blast_env:BlastBarrier-v0 --total-timesteps 4096": "needs CleanRL",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
@@ -253,6 +254,14 @@ CODE_OF_THE_BUILD: Final = {
 CODE_SHORTENED: Final = {
     ("README.md", 1): ("seeds=range(4)", "seeds=range(1), cell_m=0.5"),  # not on final cells
     ("docs/researchers/sites.md", 1): ("held_out(100)", "held_out(5)"),
+    ("docs/researchers/index.md", 2): (
+        "seed=0)\nmodel.learn(20_480)",
+        "seed=0, n_steps=16, batch_size=16)\nmodel.learn(16)",
+    ),
+    ("docs/researchers/libraries.md", 2): (
+        "n_steps=256, seed=0)  # 2,048 steps a rollout\nmodel.learn(20_480)",
+        "n_steps=16, batch_size=16, seed=0)\nmodel.learn(128)",
+    ),
 }
 """Parts of blocks of Python that are replaced to take less time, by page and number."""
 

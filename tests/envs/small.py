@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from gymnasium.utils.env_checker import data_equivalence
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -79,9 +80,13 @@ def restricted_scenario() -> Scenario:
 
 
 def make(scenario: Scenario | ScenarioSource | None = None, **arguments: Any) -> BlastBarrierEnv:
-    """Return an environment with one thin blast a charge, of the small scenario unless given."""
+    """Return an environment with one thin blast a charge, of the small scenario unless given.
+
+    Its actions are numbers of cells, which tests write in one.
+    """
     defaults: dict[str, Any] = {
         "scenario": scenario or small_scenario(),
+        "action": "place",
         "realisations": 1,
         "engine": ThinEngine(),
     }
@@ -98,8 +103,17 @@ def play(env: gym.Env, seed: int, policy_seed: int = 0, **options: Any) -> list[
     steps: list[tuple] = [(observation, 0.0, False, False, info)]
     while not steps[-1][2]:
         mask = steps[-1][4]["action_mask"]
-        steps.append(env.step(rng.choice(np.flatnonzero(mask))))
+        steps.append(env.step(legal_action(env.action_space, mask, rng)))
     return steps
+
+
+def legal_action(space: spaces.Space[Any], mask: np.ndarray, rng: np.random.Generator) -> Any:
+    """Return a random action that the mask allows, of a vector number by number."""
+    if isinstance(space, spaces.Discrete):
+        return rng.choice(np.flatnonzero(mask))
+    assert isinstance(space, spaces.MultiDiscrete)
+    parts = np.split(mask, np.cumsum(space.nvec)[:-1])
+    return np.array([rng.choice(np.flatnonzero(part)) for part in parts])
 
 
 def same(first: Any, second: Any) -> bool:

@@ -14,7 +14,13 @@ from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState, check_layout
 from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.catalogue_sites import WALL, yard
-from tests.envs.small import make, restricted_scenario, same, small_scenario
+from tests.envs.small import (
+    make,
+    restricted_scenario,
+    same,
+    small_document,
+    small_scenario,
+)
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
@@ -30,7 +36,7 @@ def blocks_scenario(**zone: Any) -> Scenario:
 
 
 def yard_env(**arguments: Any) -> BlastBarrierEnv:
-    return BlastBarrierEnv(scenario=yard(), engine="gas", **arguments)
+    return BlastBarrierEnv(scenario=yard(), engine="gas", **({"action": "place"} | arguments))
 
 
 def numbered(name: str, scenario: Scenario) -> ActionNumbers:
@@ -196,7 +202,10 @@ def test_a_full_row_means_the_nearest_row() -> None:
 
 
 def test_an_illegal_action_means_the_nearest_legal_cell() -> None:
-    """Every action of an environment with obstacles, against a search over all cells."""
+    """Every action of an environment with obstacles, against a search over all cells.
+
+    The line of sight lies along x: distances in x count first.
+    """
     corner = {"corner_m": (9.5, 10.0), "size_m": (2.5, 2.0), "reason": "door"}
     scenario = blocks_scenario(keep_outs=[{**KEEP_OUT, "size_m": (3.0, 2.5)}, corner])
     _, columns = scenario.zone.shape
@@ -208,7 +217,7 @@ def test_an_illegal_action_means_the_nearest_legal_cell() -> None:
     assert len(illegal) > 20
     for action in illegal:
         row, column = divmod(action, columns)
-        away = [(up - row) ** 2 + (right - column) ** 2 for up, right in legal]
+        away = [(abs(right - column), abs(up - row)) for up, right in legal]
         env.reset(seed=0)
         _, _, ended, _, info = env.step(action)
         assert env.placement.cells == (legal[away.index(min(away))],)
@@ -230,6 +239,25 @@ def test_the_nearest_place_is_of_the_same_item_in_the_same_rotation() -> None:
         tried.add(wanted)
         assert catalogue.variants[catalogue.variant_number(placed)] == wanted
     assert len(tried) == 3  # a post stands everywhere
+
+
+def test_an_action_that_is_repeated_builds_a_wall_across_the_line_of_sight() -> None:
+    """Where the line lies along y, along a row of cells; where along x, along a column."""
+    document = small_document(rows=9, columns=9, stock=5, keep_outs=[])
+    south = {**document["charge"][1], "position_m": (9.25, 2.0), "weight": 1000.0}
+    north = {**document["structures"][1], "corner_m": (8.0, 15.0), "rows": 4, "columns": 8}
+    turned = document | {"charge": [south], "structures": [north]}
+    for found, wall in (
+        (document, [(row, 4) for row in (2, 3, 4, 5, 6)]),
+        (turned, [(4, column) for column in (2, 3, 4, 5, 6)]),
+    ):
+        env = make(Scenario.model_validate(found), action="dimensions")
+        env.reset(seed=0)
+        ended = False
+        while not ended:
+            *_, ended, _, info = env.step((0, 4, 4))
+        assert sorted(env.placement.cells) == wall
+        assert info["invalid_actions"] == 4
 
 
 @pytest.mark.parametrize("name", list(ACTIONS))
@@ -268,11 +296,13 @@ def test_block_and_cell_mean_the_nearest_ones() -> None:
     scenario = blocks_scenario(keep_outs=[{**KEEP_OUT, "size_m": (4.0, 4.0)}])  # block 0
     env = make(action="item_then_block", scenario=scenario)
     env.reset(seed=1)
+    env.step(0)  # the block above it, across the line of sight
+    env.step(4 + 9)
     env.step(0)
-    env.step(4 + 9)  # block 1 has two columns: the nearest to row 1, column 1 of a block
+    env.step(4 + 9)  # taken: the cell below, before the equally near one
     env.step(1)
-    env.step(4 + 9)  # taken: the cell below, before the equally near ones
-    assert env.placement.layout == ((1, 9), (0, 9))
+    env.step(4 + 9)  # that block has two columns
+    assert env.placement.layout == ((9, 1), (8, 1), (1, 9))
 
 
 # --- A cell is offered exactly if a module may be placed on it.

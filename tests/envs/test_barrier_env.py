@@ -460,7 +460,9 @@ HUT = hut()
 
 
 def on_gas(**options: Any) -> gym.Env:
-    return gym.make("BlastBarrierGas-v0", scenario=HUT, disable_env_checker=True, **options)
+    return gym.make(
+        "BlastBarrierGas-v0", scenario=HUT, action="place", disable_env_checker=True, **options
+    )
 
 
 def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:

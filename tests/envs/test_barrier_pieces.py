@@ -21,7 +21,7 @@ from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_documen
 
 
 def yard_env(**arguments: Any) -> BlastBarrierEnv:
-    return BlastBarrierEnv(scenario=yard(), engine="gas", **arguments)
+    return BlastBarrierEnv(scenario=yard(), engine="gas", **({"action": "place"} | arguments))
 
 
 def test_actions_place_pieces_and_the_charge_goes_off() -> None:
@@ -140,7 +140,9 @@ FINISH = np.int64(16 * 4)
 
 
 def gate(**changes: Any) -> BlastBarrierEnv:
-    return BlastBarrierEnv(SITE, **({"engine": "gas", "observation": "grid"} | changes))
+    return BlastBarrierEnv(
+        SITE, **({"engine": "gas", "action": "place", "observation": "grid"} | changes)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -170,7 +172,7 @@ def test_pieces_stop_the_vehicle_as_what_they_are() -> None:
     zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
     site = gate_site(build_zone=zone)
     layout = (Piece(4, 1, "wall", True), Piece(12, 0, "mat", True), Piece(0, 0, "mat", True))
-    barrier = BlastBarrierEnv(site, engine="gas", observation="grid")
+    barrier = BlastBarrierEnv(site, engine="gas", action="place", observation="grid")
     barrier.reset(seed=0, options={"layout": layout})
     *_, info = barrier.step(site.zone.catalogue.finish)
     worst = worst_places(site, vehicle_of(site), barrier.placement.layout)
@@ -230,7 +232,8 @@ def test_the_vector_ends_with_the_stand_off() -> None:
 def test_with_a_catalogue_the_vector_keeps_the_order_of_its_parts() -> None:
     items = [{"name": "post", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 8}]
     zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
-    barrier = BlastBarrierEnv(gate_site(build_zone=zone), engine="gas", observation="features")
+    site = gate_site(build_zone=zone)
+    barrier = BlastBarrierEnv(site, engine="gas", action="place", observation="features")
     observation, info = barrier.reset(seed=0)
     assert observation[-1] == pytest.approx(1.0 / np.hypot(14.0, 8.0))
     legal = np.asarray(info["action_mask"][:-1], dtype=bool)

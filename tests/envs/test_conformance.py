@@ -47,7 +47,7 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
             continue
         env = gym.make("BlastBarrier-v0", scenario=name)
         assert isinstance(env.unwrapped, barrier_env.BlastBarrierEnv)
-        assert env.action_space.n > 100  # type: ignore[attr-defined]
+        assert env.action_space.nvec.prod() > 100  # type: ignore[attr-defined]
         expected = "gas" if scenario.height_notes else "event"
         assert env.unwrapped.task.engine.name == expected
 
@@ -58,6 +58,7 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
         *({"observation": name} for name in ("image", "grid", "features", "dict")),
         {"observation": "grid", "reward": "incremental", "threat": "hidden", "threats": 2},
         {"reward": "relative", "threat": "hidden", "threats": 2},
+        {"observation": "dict", "action": "dimensions"},
         {"observation": "dict", "action": "item_then_place", "invalid_action": "penalty"},
         {"observation": "dict", "action": "item_then_block"},
         {"observation": "dict", "action": "row"},
@@ -119,7 +120,12 @@ def test_paths_and_layouts_survive_json(tmp_path: Path) -> None:
 
 def rollout(mode: str | None, **arguments: Any) -> list[Any]:
     """Return what two environments gave in a dozen steps, over the ends of episodes."""
-    defaults = {"scenario": small_scenario(), "engine": ThinEngine(), "realisations": 1}
+    defaults = {
+        "scenario": small_scenario(),
+        "action": "place",
+        "engine": ThinEngine(),
+        "realisations": 1,
+    }
     vector = gym.make_vec(
         "BlastBarrier-v0", num_envs=2, vectorization_mode=mode, **{**defaults, **arguments}
     )
@@ -166,6 +172,7 @@ def test_vectors_of_environments_stack_the_information() -> None:
         "BlastBarrier-v0",
         num_envs=2,
         vectorization_mode="sync",
+        action="place",
         invalid_action="penalty",
         scenario=small_scenario(),
         engine=ThinEngine(),

@@ -16,7 +16,7 @@ ID = "BlastBarrier-MO-v0"
 
 def make(scenario: str) -> gym.Env[Any, Any]:
     env: gym.Env[Any, Any] = mo_gymnasium_make(
-        ID, scenario=scenario, engine=ShadeEngine(), observation="features"
+        ID, scenario=scenario, engine=ShadeEngine(), observation="features", action="place"
     )
     return env
 

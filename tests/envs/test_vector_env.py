@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.surrogate import SurrogateEngine
-from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
+from tests.envs.small import ThinEngine, legal_action, restricted_scenario, same, small_scenario
 from tests.envs.test_barrier_env import CountOfModules
 from tests.evaluation.engines.shade import ShadeEngine
 
@@ -37,8 +37,9 @@ def rollout(mode: str, how: str, name: str = "BlastBarrier-v0", **chosen: Any) -
     steps: list[Any] = [(observation, info)]
     rng = np.random.default_rng(1)
     for _ in range(STEPS):
+        space = envs.single_action_space
         actions = [
-            rng.choice(np.flatnonzero(mask)) if rng.random() < 0.7 else rng.integers(len(mask))
+            legal_action(space, mask if rng.random() < 0.7 else np.ones_like(mask), rng)
             for mask in info["action_mask"]
         ]
         observation, reward, ended, cut, info = envs.step(np.array(actions))
@@ -83,6 +84,7 @@ def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
     "chosen",
     [
         {"scenario": "control_room", "observation": "features"},
+        {"scenario": "control_room", "observation": "features", "action": "place"},
         {"scenario": "control_room", "observation": "image", "action": "row"},
         {"scenario": "control_room", "observation": "dict", "action": "item_then_block"},
         {"scenario": "control_room", "threat": "hidden", "threats": 4, "reward": "relative"},
@@ -103,7 +105,8 @@ def test_it_takes_what_a_single_environment_takes() -> None:
 
 
 def test_wrong_calls_are_refused_and_change_nothing() -> None:
-    envs = BlastBarrierVectorEnv(2, "Disabled", scenario=small_scenario(), engine=ThinEngine())
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    envs = BlastBarrierVectorEnv(2, "Disabled", action="place", **chosen)
     with pytest.raises(gym.error.ResetNeeded):
         envs.step([0, 0])
     first, _ = envs.reset(seed=1)

@@ -77,7 +77,7 @@ def test_seeds_stay_in_their_range(purpose: SeedRange) -> None:
 
 
 def test_an_environment_draws_seeds_for_training() -> None:
-    env = gym.make("BlastBarrier-v0", disable_env_checker=True)
+    env = gym.make("BlastBarrier-v0", action="place", disable_env_checker=True)
     env.reset(seed=0)
     assert isinstance(env.action_space, gym.spaces.Discrete)
     finish = env.action_space.n - 1

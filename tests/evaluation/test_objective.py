@@ -121,7 +121,7 @@ def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
 @pytest.mark.parametrize(("quantity", "term"), [("impulse", "impulse"), ("peak", "peak")])
 @pytest.mark.parametrize("reward", ["terminal", "incremental"])
 def test_the_reward_is_minus_what_counts(reward: str, quantity: str, term: str) -> None:
-    env = BlastBarrierEnv(scenario=site(quantity=quantity), engine="gas", reward=reward)
+    env = BlastBarrierEnv(site(quantity=quantity), reward, action="place", engine="gas")
     env.reset(seed=0)
     paid = []
     for action in (0, env.placement.catalogue.finish):
@@ -183,7 +183,7 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     *_, last = means(evaluation, own.objective)
     expected = Number(protected, "Pa s of cracking").text()
     assert last.text().startswith(f"with barrier: mean {expected}")
-    env = BlastBarrierEnv(scenario=own, engine="gas")
+    env = BlastBarrierEnv(scenario=own, action="place", engine="gas")
     env.reset(seed=0, options={"charge_position_m": (2.0, 4.0), "layout": WALL})
     _, _, _, _, info = env.step(env.placement.catalogue.finish)
     assert info["reward_terms"]["impulse"] == pytest.approx(1.0 - protected / unprotected)

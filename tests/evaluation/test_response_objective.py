@@ -97,9 +97,10 @@ def test_case_counts_the_cost_of_a_layout_that_passes() -> None:
 
 def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None:
     surrogate = SurrogateEngine()
-    env = BlastBarrierEnv(glazed_yard(target="medium"), engine=surrogate, reward="incremental")
+    site = glazed_yard(target="medium")
+    env = BlastBarrierEnv(site, "incremental", action="place", engine=surrogate)
     env.reset(seed=0)
-    catalogue = LayoutState.empty(glazed_yard(target="medium")).catalogue
+    catalogue = LayoutState.empty(site).catalogue
     paid = 0.0
     for action in (catalogue.action(TAKEN), catalogue.finish):
         _, reward, terminated, _, info = env.step(action)

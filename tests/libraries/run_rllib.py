@@ -22,7 +22,7 @@ class Masked(gym.ObservationWrapper[Any, Any, Any]):
     """Gives the mask with the observation, as RLlib's example of masked actions wants it."""
 
     def __init__(self, config: dict[str, str]) -> None:
-        chosen = {**arguments(config["name"]), "observation": "features"}
+        chosen = {**arguments(config["name"]), "observation": "features", "action": "place"}
         super().__init__(gym.make(config["name"], disable_env_checker=True, **chosen))
         assert isinstance(self.env.action_space, gym.spaces.Discrete)
         mask = gym.spaces.Box(0.0, 1.0, (int(self.env.action_space.n),), np.float32)

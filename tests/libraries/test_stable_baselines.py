@@ -57,7 +57,7 @@ def test_a_network_of_ones_own_gets_the_planes_in_their_order() -> None:
 
 @pytest.mark.parametrize("name", ["BlastBarrier-v0", "BlastBarrierItemSites-v0"])
 def test_maskable_ppo_gives_illegal_actions_no_probability(name: str) -> None:
-    env = gym.make(name, **arguments(name))
+    env = gym.make(name, action="place", **arguments(name))
     model = MaskablePPO("MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL).learn(_STEPS)
     _, info = env.reset(seed=0)
     placed = int(info["action_mask"].argmax())

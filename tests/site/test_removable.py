@@ -110,7 +110,7 @@ def test_a_vehicle_drives_where_it_stood() -> None:
 def test_environment_and_search_take_it_where_it_pays() -> None:
     """Behind a fence that a wall of the same height replaces, nothing is left to gain by it."""
     scenario = fenced(budget=3.0, items=[{**_ITEM, "cost": 3.0}])
-    environment = BlastBarrierEnv(scenario, engine=SHORT)
+    environment = BlastBarrierEnv(scenario, action="place", engine=SHORT)
     _, info = environment.reset(seed=0)
     action = LayoutState.empty(scenario).catalogue.action(AWAY)
     assert info["action_mask"][action]

@@ -9,7 +9,7 @@ from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.envs.small import ThinEngine
 
 ID = "BlastBarrierSites-v0"
-FINISH = 28 * 28
+ROWS = 28
 
 
 def make(**arguments: Any) -> BlastBarrierEnv:
@@ -26,7 +26,7 @@ def test_every_reset_gives_another_site_to_train_on() -> None:
     for _ in range(10):
         observation, info = env.reset()
         assert env.observation_space.contains(observation)
-        assert info["action_mask"].shape == (FINISH + 1,)
+        assert info["action_mask"].shape == (1 + ROWS + 1 + ROWS,)
         names.append(env.observable.scenario.name)
     assert len(set(names)) == 10
     assert all(int(name.removeprefix("site_")) >= HELD_OUT_SITES for name in names)

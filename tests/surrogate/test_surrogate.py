@@ -383,7 +383,7 @@ def test_intervals_are_as_wide_as_their_factors_say() -> None:
 
 def test_an_environment_pays_by_guesses() -> None:
     surrogate = by_hand()
-    env = BlastBarrierEnv(scenario=YARD, engine=SurrogateEngine(surrogate), reward="terminal")
+    env = BlastBarrierEnv(YARD, action="place", engine=SurrogateEngine(surrogate))
     _, info = env.reset(seed=0)
     actions = np.flatnonzero(info["action_mask"])
     _, _, _, _, _ = env.step(actions[0])

@@ -242,6 +242,7 @@ class EnvironmentMaker:
         threats = {"threats": settings.hidden_threats} if settings.threat == "hidden" else {}
         return {
             "scenario": self.source,
+            "action": "place",  # the networks of `blast_agents.policies` rate every placement
             "reward": "relative",
             "realisations": 1,
             "engine": settings.blast_engine,

@@ -36,9 +36,9 @@ def test_it_is_found_by_its_name_and_described() -> None:
 def test_an_episode_is_played_with_it() -> None:
     env = gym.make("BlastBarrier-v0", scenario="courtyard", engine="shade")
     env.reset(seed=0)
-    for action in (160, 176):
+    for action in ((0, 10, 0), (0, 11, 0)):
         _, _, ended, _, _ = env.step(action)
-    _, reward, ended, _, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+    _, reward, ended, _, info = env.step(env.unwrapped.finish)  # type: ignore[attr-defined]
     assert ended
     assert info["reduction"] == pytest.approx(1.0 - 0.9**2)
     assert info["reward_terms"]["impulse"] == pytest.approx(1.0 - 0.9**2)
