@@ -1,10 +1,10 @@
-"""PPO and MaskablePPO with the defaults of their libraries on a site, beside the rules.
+"""PPO and MaskablePPO with the defaults of their libraries on sites, beside the rules.
 
 `python -m studies.first_hour` prints the tables of docs/researchers/training.md.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import process_time
 from typing import Annotated, Any, Final
@@ -17,16 +17,19 @@ from blast_agents.training.environments import ThreatPool
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
-from blast_env.answers.terminal import print_line
+from blast_env.answers.terminal import print_line, print_table
 from blast_env.arrays import FloatArray
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.strategies import Reward
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import mean_estimate
 
 HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
+
+RANDOM: Final = "random"
 
 Agent = PPO | MaskablePPO
 KNOWN: Final[dict[str, type[Agent]]] = {
@@ -46,9 +49,9 @@ class Setting:
     """
 
     scenario: str
-    engine: str
-    reward: str
-    action: str
+    engine: str = "event"
+    reward: str | Reward = "terminal"
+    action: str = "dimensions"
 
     def environment(
         self, engine: Engine, realisations: int | None = None, cache: str | None = None
@@ -115,14 +118,103 @@ def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, 
         yield name, np.array(item)
 
 
-def report(name: str, of_episodes: FloatArray, best: FloatArray | None = None) -> None:
-    """Print a mean reduction with its 95 % interval, and the paired lead over the best rule."""
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What an engine says of methods on the held-out threats of a site.
+
+    Attributes:
+        site: The site.
+        judge: Name of the engine.
+        rules: Reductions by each rule (threats,).
+        random: Those by random legal actions.
+        trained: Those by each trained agent, by its name: algorithm, seed, cost.
+        others: Those by any other method.
+    """
+
+    site: str
+    judge: str
+    rules: Mapping[str, FloatArray]
+    random: FloatArray
+    trained: Mapping[str, FloatArray]
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def best_rule(self) -> FloatArray:
+        """The reductions by the rule of the largest mean."""
+        return max(self.rules.values(), key=lambda rule: float(rule.mean()))
+
+    def of(self, algorithm: str) -> FloatArray:
+        """Return the reductions by the agents of an algorithm (agents, threats)."""
+        named = (item for name, item in self.trained.items() if name.split(",")[0] == algorithm)
+        return np.array([*named])
+
+    def lines(self) -> Iterator[str]:
+        """Yield a line for each method: mean, 95 % interval, and lead over the best rule."""
+        yield f"{self.site}, judged by {self.judge} on {len(self.random)} threats"
+        for name, item in (*self.rules.items(), (RANDOM, self.random)):
+            yield f"{name}: {_mean(item)}"
+        for name, item in (*self.others.items(), *self.trained.items()):
+            more, least, most = mean_estimate(item - self.best_rule).scaled(100.0)
+            lead = f"{more:+.1f} points on the best rule ({least:.1f} to {most:.1f})"
+            yield f"{name}: {_mean(item)}; {lead}"
+
+    def row(self) -> tuple[str, ...]:
+        """Return the row of the site in the table: means over threats and seeds, %."""
+        cells = [self.site, self.judge, f"{100.0 * self.random.mean():.1f}"]
+        for algorithm, beside in zip(KNOWN, (self.random, self.best_rule), strict=True):
+            found = self.of(algorithm)
+            if algorithm == "MaskablePPO":
+                cells.append(f"{100.0 * self.best_rule.mean():.1f}")
+            if not len(found):
+                cells += ["", ""]
+                continue
+            means = 100.0 * found.mean(axis=1)
+            ends = f" ({means.min():.1f} to {means.max():.1f})" if len(means) > 1 else ""
+            cells += [
+                f"{means.mean():.1f}{ends}",
+                f"{100.0 * (found - beside).mean():+.1f}",
+            ]
+        return tuple(cells)
+
+
+HEADERS: Final = (
+    "site",
+    "judged by",
+    "random",
+    "PPO",
+    "its lead on random",
+    "best rule",
+    "MaskablePPO",
+    "its lead on the best rule",
+)
+
+
+def _mean(of_episodes: FloatArray) -> str:
     value, low, _ = mean_estimate(of_episodes).scaled(100.0)
-    lead = ""
-    if best is not None:
-        more, least, most = mean_estimate(of_episodes - best).scaled(100.0)
-        lead = f"; {more:+.1f} points on the best rule ({least:.1f} to {most:.1f})"
-    print_line(f"{name}: {value:.1f} % +- {value - low:.1f}{lead}")
+    return f"{value:.1f} % +- {value - low:.1f}"
+
+
+def judged(
+    setting: Setting,
+    engine: Engine,
+    agents: Mapping[str, Agent],
+    seeds: Sequence[int],
+    cache: str | None = None,
+) -> Judgement:
+    """Return what an engine says of agents, rules and random actions."""
+    env = setting.environment(engine, cache=cache)
+    flat = replace(setting, action="place").environment(engine, cache=cache)
+    others = {}
+    if setting.action == "row":
+        others["the nearest row again and again"] = reductions(env, 0, seeds)
+    return Judgement(
+        setting.scenario,
+        engine.name,
+        dict(by_rules(flat, seeds)),
+        reductions(flat, None, seeds),
+        {name: reductions(env, agent, seeds) for name, agent in agents.items()},
+        others,
+    )
 
 
 def main(
@@ -130,44 +222,36 @@ def main(
     algorithm: Annotated[
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
-    scenario: Annotated[str, typer.Option(help="The site.")] = "courtyard",
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="The site, courtyard by default; may be given again.")
+    ] = None,
     engine: Annotated[str, typer.Option(help="Engine of the training.")] = "event",
     reward: Annotated[str, typer.Option(help="Reward.")] = "terminal",
-    action: Annotated[str, typer.Option(help="Action space.")] = "row",
+    action: Annotated[str, typer.Option(help="Action space.")] = "dimensions",
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
     by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 12,
     cache: Annotated[str | None, typer.Option(help="Folder for the blasts of gas.")] = None,
 ) -> None:
-    """Train, and judge on held-out threats; print one line for each rule and agent."""
+    """Train, and judge on held-out threats: a line for each method, then a row for each site."""
     torch.set_num_threads(1)
-    setting = Setting(scenario, engine, reward, action)
-    agents: dict[str, Agent] = {}
-    for kind in algorithm or KNOWN:
-        for seed in range(seeds):
-            began_s = process_time()
-            agent = trained(kind, setting, steps, seed)
-            agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
-    for judge, judged in (
-        (setting.training, HELD_OUT[:threats]),
-        (find_engine("gas"), HELD_OUT[:by_gas]),
-    ):
-        if not judged:
-            continue
-        print_line(f"judged by {judge.name} on {len(judged)} threats")
-        kept = cache if judge.name == "gas" else None
-        env = setting.environment(judge, cache=kept)
-        flat = replace(setting, action="place").environment(judge, cache=kept)
-        rules = dict(by_rules(flat, judged))
-        best = max(rules.values(), key=lambda rule: float(rule.mean()))
-        for name, rule in rules.items():
-            report(name, rule)
-        if action == "row":
-            report("the nearest row again and again", reductions(env, 0, judged), best)
-        if judge is setting.training:
-            report("random", reductions(flat, None, judged))
-        for name, agent in agents.items():
-            report(name, reductions(env, agent, judged), best)
+    rows = []
+    for site in scenario or ["courtyard"]:
+        setting = Setting(site, engine, reward, action)
+        agents: dict[str, Agent] = {}
+        for kind in algorithm or KNOWN:
+            for seed in range(seeds):
+                began_s = process_time()
+                agent = trained(kind, setting, steps, seed)
+                agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
+        found = [judged(setting, setting.training, agents, HELD_OUT[:threats])]
+        if by_gas:
+            found.append(judged(setting, find_engine("gas"), agents, HELD_OUT[:by_gas], cache))
+        for judgement in found:
+            for line in judgement.lines():
+                print_line(line)
+            rows.append(judgement.row())
+    print_table("reduction, %", HEADERS, rows, 2)
 
 
 if __name__ == "__main__":

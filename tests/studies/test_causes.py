@@ -1,0 +1,58 @@
+"""What kept plain PPO from learning: the former reward, and heaps in the place of walls."""
+
+import numpy as np
+import pytest
+
+from blast_env.units import PA_PER_PSI
+from studies.causes import Deposit, heaped, repeated, settings
+from studies.first_hour import Judgement, Setting
+from tests.evaluation.engines.shade import ShadeEngine
+
+FLAT = Setting("courtyard", action="place")
+
+
+@pytest.mark.parametrize("in_psi_s", [True, False])
+def test_the_deposit_comes_back_and_the_sum_is_minus_the_load(in_psi_s: bool) -> None:
+    setting = Setting("courtyard", reward=Deposit(2.0, in_psi_s=in_psi_s))
+    env = setting.environment(ShadeEngine())
+    env.reset(seed=0)
+    first, last = env.step((0, 10, 0))[1], env.step(env.finish)
+    load, bare = last[4]["impulse_pa_s"], last[4]["unprotected_impulse_pa_s"]
+    unit = PA_PER_PSI if in_psi_s else bare
+    assert first == pytest.approx(-2.0 * bare / unit)
+    assert first + last[1] == pytest.approx(-load / unit)
+
+
+def test_each_cause_is_taken_away_alone() -> None:
+    former, *without, present = settings("courtyard", "event").values()
+    changes = [
+        {name for name in ("reward", "action") if getattr(item, name) != getattr(former, name)}
+        for item in without
+    ]
+    assert changes == [{"reward"}, {"reward"}, {"action"}]
+    assert present == Setting("courtyard", "event")
+
+
+def test_what_is_repeated_is_a_heap_or_a_wall() -> None:
+    env = FLAT.environment(ShadeEngine())
+    heap = np.array(heaped(env, 20 * 16 + 8))
+    assert np.ptp(heap, axis=0).max() < 8
+    env.reset(seed=0)
+    ended = False
+    while not ended:
+        ended = env.step(20 * 16 + 8)[2]
+    high, wide = np.ptp(np.array(env.placement.cells), axis=0).tolist()
+    assert (high >= 15, wide) == (True, 0)
+    found = repeated(env, [0], each_way=1)
+    assert found["heaps"].value == found["walls"].value == pytest.approx(1.0 - 0.9**16)
+
+
+def test_a_row_of_the_table_has_leads_over_random_and_over_the_best_rule() -> None:
+    one, two = np.array([0.1, 0.3]), np.array([0.3, 0.3])
+    trained = {"PPO, seed 0, 1 CPU s": two, "PPO, seed 1, 1 CPU s": one}
+    found = Judgement("courtyard", "gas", {"a": one, "b": two}, np.zeros(2), trained)
+    assert found.row() == (
+        *("courtyard", "gas", "0.0"),
+        *("25.0 (20.0 to 30.0)", "+25.0"),
+        *("30.0", "", ""),
+    )
