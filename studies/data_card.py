@@ -29,6 +29,7 @@ _ORIGINS: Final = {
     "close_site_blasts": "generated sites 16 to 26 m wide",
     "front_site_blasts": "such sites on which only the walls count that the blast comes from",
     "kerb_site_blasts": "generated sites along a kerb, with walls opposite and vehicles",
+    "street_site_blasts": "streets open at both ends, where a vehicle drives along the fronts",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)

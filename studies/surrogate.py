@@ -54,7 +54,8 @@ from studies.blast_table import COLUMNS
 from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
-    Path(f"docs/data/{name}_site_blasts.parquet") for name in ("front", "close", "many", "kerb")
+    Path(f"docs/data/{name}_site_blasts.parquet")
+    for name in ("front", "close", "many", "kerb", "street")
 )
 """Training data of the packaged surrogate: blasts on generated sites."""
 

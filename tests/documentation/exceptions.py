@@ -159,8 +159,10 @@ SMALLER: Final[dict[str, str]] = {
         "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
-    " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites --sites 24"
-    " --surrogate surrogate.json": "--charges 1 --changes 1 --sites 1",
+    " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites"
+    " --kind street_sites --sites 24 --surrogate surrogate.json": (
+        "--charges 1 --changes 1 --sites 1"
+    ),
     # docs/researchers/benchmark.md
     "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
@@ -170,6 +172,8 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
     " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",
+    "blast-env judge --scenario item_sites --scenario kerb_sites --cases 30 --budget 0 --budget 10"
+    " --method rules --method surrogate --out out/entry": "--cases 1 --budget 0 --cell 0.5",
     "blast-env judge entry/genetic.json --cache blasts --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers

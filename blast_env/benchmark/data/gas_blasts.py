@@ -18,6 +18,7 @@ TABLES: Final = (
     "close_site_blasts",
     "front_site_blasts",
     "kerb_site_blasts",
+    "street_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
