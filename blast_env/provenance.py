@@ -13,6 +13,7 @@ _NO_INFLUENCE: Final = frozenset(
     {
         "__init__.py",
         "__main__.py",
+        "atlas",
         "benchmark",
         "cli",
         "envs",

@@ -5,9 +5,9 @@ from typing import Final
 
 from blast_env.answers.document import AnyPart, Line, Table
 from blast_env.evaluation.questions.screening import (
-    LEFT_OUT,
     LOW_BY,
     RAISED_SCALED_M,
+    BayScreening,
     Screening,
     ThreatScreening,
 )
@@ -18,6 +18,7 @@ from blast_env.response.components import Wall
 from blast_env.response.facade import response_words
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
+from blast_env.values import count_of
 
 _THREATS: Final = (
     *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
@@ -26,6 +27,7 @@ _THREATS: Final = (
 _STAND_OFFS: Final = (
     *("component", "high, GSA 1, ISO A", "medium, 2, B", "low, 3a, D", "very low, 3b, E"),
 )
+_AROUND: Final = ("threat", "bays", "surroundings", "factor of the impulse", "largest of them")
 _LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
 
 
@@ -59,13 +61,18 @@ def screening_answer(
     for threat in found.threats:
         if threat.may_be_low:
             yield Line.of(_low_words(threat), kind="flag")
+    around = [row for threat in found.threats for row in _around_rows(threat)]
+    if around:
+        yield Table.of("what stands around, by the atlas of shielding", _AROUND, around)
+    for threat in found.threats:
+        yield from map(Line.of, _unknown_words(threat))
     for threat in found.threats:
         title = (
             f"stand-off (m) from which a component allows a level, {threat.name},"
             f" {threat.charge.tnt_kg:g} kg TNT (* on this site)"
         )
         yield Table.of(title, _STAND_OFFS, _stand_off_rows(found, threat))
-    yield Line.of(LEFT_OUT, kind="quiet")
+    yield Line.of(found.left_out, kind="quiet")
 
 
 def _threat_row(
@@ -92,6 +99,38 @@ def _low_words(threat: ThreatScreening) -> str:
         f" {threat.scaled_m:.1f} m/kg^(1/3); nearer than {RAISED_SCALED_M:g}, gas has up to"
         f" {LOW_BY:g} times screening's impulse: a blast by gas decides"
     )
+
+
+def _around_rows(threat: ThreatScreening) -> Iterator[tuple[str, ...]]:
+    """Yield one row per surroundings: how many bays they change, and by how much."""
+    groups: dict[str, list[BayScreening]] = {}
+    for bay in threat.bays:
+        if bay.around:
+            groups.setdefault(bay.around, []).append(bay)
+    for words, own in groups.items():
+        middle = [bay.factor[0] for bay in own]
+        most = max(own, key=lambda bay: bay.factor[0])
+        spread = f"x {min(middle):.2f} to {max(middle):.2f}" if len(own) > 1 else ""
+        yield threat.name, str(len(own)), words, spread, _factor_words(most)
+
+
+def _factor_words(bay: BayScreening) -> str:
+    middle, low, high = bay.factor
+    return f"{bay.filled.bay.name}: x {middle:.2f}, {low:.2f} to {high:.2f}"
+
+
+def _unknown_words(threat: ThreatScreening) -> Iterator[str]:
+    """Yield what lies outside the range of the atlas, with the number of its bays."""
+    counts: dict[str, int] = {}
+    for bay in threat.bays:
+        if bay.unknown:
+            counts[bay.unknown] = counts.get(bay.unknown, 0) + 1
+    for words, count in counts.items():
+        yield (
+            f"{threat.name}: {count_of('bay', count)} outside the range of the atlas: {words}:"
+            " obstacles take nothing off there, fronts count as at the end of the range; a blast by"
+            " gas decides"
+        )
 
 
 def _stand_off_rows(found: Screening, threat: ThreatScreening) -> Iterator[tuple[str, ...]]:

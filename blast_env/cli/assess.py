@@ -17,6 +17,7 @@ from blast_env.answers.assess import (
 )
 from blast_env.answers.screening import screening_answer
 from blast_env.answers.terminal import print_line, print_parts
+from blast_env.atlas import Laws, packaged_laws
 from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     CacheOption,
@@ -77,7 +78,7 @@ _MASS_HELP: Final = (
     f"Charge at every place of the site's charges: {', '.join(CHARGE_PRESETS)}, or "
     f"NAME=KG[,EXPLOSIVE] with {', '.join(TNT_EQUIVALENTS)}; else the site's own. May be repeated."
 )
-_OF_SCREENING: Final = ("mass", "gas")
+_OF_SCREENING: Final = ("mass", "gas", "shielding")
 _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg", "cache")
 _OF_ASSESSMENT: Final = ("without_fallen", "diagram", "table")
 _NOT_OF_CAPACITY: Final = (*_OF_ASSESSMENT, "require", "target", "mass_error", "picture")
@@ -132,6 +133,12 @@ def assess(
         help="Gas dynamics of each worst place, for comparison.",
         rich_help_panel=_SCREEN,
     ),
+    shielding: bool = typer.Option(
+        True,
+        "--shielding/--no-shielding",
+        help="Change loads by what stands around, by the atlas of shielding.",
+        rich_help_panel=_SCREEN,
+    ),
 ) -> None:
     """Assess the damage of buildings by charges: panes, panels, level of protection.
 
@@ -140,7 +147,8 @@ def assess(
     house. The effect of better glass needs no further blast, and is printed as well. The worst
     charge runs on cells twice as large as well: the difference gives the grid error.
 
-    --screen takes Kingery and Bulmash's loads in the open, by angle of incidence and sight.
+    --screen takes Kingery and Bulmash's loads in the open by angle of incidence, and the atlas of
+    shielding for walls, rows, streets, courts and shadows.
     --capacity runs a few blasts at each place, with other masses and stand-offs.
     """
     if screen and capacity:
@@ -151,7 +159,8 @@ def assess(
     engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     if screen:
         refuse_given(context, _OF_DRAWN_CHARGES + _OF_ASSESSMENT, "does not apply to --screen")
-        _screen(site, elements, mass, required, engine if gas else None, picture)
+        atlas = packaged_laws() if shielding else None
+        _screen(site, elements, mass, required, engine if gas else None, picture, atlas)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
     layouts: dict[str, Layout] = {"no barrier": ()}
@@ -202,12 +211,13 @@ def _screen(
     required: Sequence[Requirement],
     engine: Engine | None,
     picture: Path | None,
+    atlas: Laws | None,
 ) -> None:
     """Print the level of protection of each facade, and the stand-off that each level needs."""
     level = scenario.objective.level or LevelOfProtection.LOW
     required = required or [Requirement.of_level(level)]
     named = [MassPreset.parsed(mass) for mass in masses]
-    found = screen_site(scenario, layout, named)
+    found = screen_site(scenario, layout, named, atlas)
     beside = {} if engine is None else _by_gas(scenario, layout, found, engine)
     print_parts(screening_answer(scenario, layout, found, required, beside))
     if named:

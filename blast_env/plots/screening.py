@@ -73,7 +73,7 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
     write_heading(
         figure,
         f"{scenario.name}: level of protection by the place of a charge",
-        "Kingery and Bulmash in the open, at right angles; no shielding, no echoes",
+        "Kingery and Bulmash in the open, at right angles; rings know no shielding, no echoes",
     )
     for axes in panels:
         write_names(axes, without(features, Kinds.CHARGE_PLACE, Kinds.GAUGE))

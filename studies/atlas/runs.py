@@ -6,9 +6,12 @@ from pathlib import Path
 from time import process_time
 from typing import Any, Final
 
+import pandas as pd
+
 from blast_env.documents import parse_json
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import make_folder, write_text
+from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M
 from studies.atlas.families import FAMILIES
 from studies.atlas.scenes import Scene, loads_of
@@ -67,6 +70,52 @@ def _with_loads(scene: Scene, engine: GasEngine) -> dict[str, Any]:
         "known": loads.known,
         "seconds": round(process_time() - began_s, 2),
     }
+
+
+COLUMNS: Final = (
+    Column("family", "", "family of the designed experiment", True),
+    Column("group", "", "number of the group: a site without and with obstacles"),
+    Column("scene", "", "number in the group; 0 is what the others are compared with"),
+    Column("cell_m", "m", "side of the cells; a module is 0.5 m, the charge 216 kg"),
+    Column("engine", "", "engine and its version", True),
+    Column("boxes", "", "JSON: numbers, judged box, walls with loads, other boxes, height", True),
+    Column("loads", "", "JSON: bays, middles, normals, impulses over the cube root, peaks", True),
+)
+"""One row per blast."""
+
+_OF_LOADS: Final = ("bays", "middles", "normals", "impulse", "peak", "known", "seconds")
+
+
+def table_of_runs(folder: Path) -> tuple[pd.DataFrame, int]:
+    """Return the table of a folder's blasts, and their number."""
+    rows = []
+    for fine in (False, True):
+        for group in groups_in(folder, fine):
+            for number, scene in enumerate(group["scenes"]):
+                loads = {name: scene.pop(name) for name in _OF_LOADS}
+                rows.append(
+                    {
+                        **{name: group[name] for name in ("family", "group", "cell_m", "engine")},
+                        "scene": number,
+                        "boxes": json.dumps(scene),
+                        "loads": json.dumps(loads),
+                    }
+                )
+    return table_of(rows, COLUMNS), len(rows)
+
+
+def groups_of(table: pd.DataFrame, cell_m: float) -> Iterator[dict[str, Any]]:
+    """Yield the groups of a table that were run on cells of a size."""
+    chosen = table[table["cell_m"] == cell_m]
+    names = dict.fromkeys(zip(chosen["family"], chosen["group"].tolist(), strict=True))
+    for family, number in sorted(names):
+        own = chosen[(chosen["family"] == family) & (chosen["group"] == number)]
+        rows = own.sort_values("scene")
+        scenes = [
+            {**parse_json(boxes), **parse_json(loads)}
+            for boxes, loads in zip(rows["boxes"], rows["loads"], strict=True)
+        ]
+        yield {"family": family, "group": number, "scenes": scenes}
 
 
 def groups_in(folder: Path, fine: bool = False) -> Iterator[dict[str, Any]]:

@@ -23,7 +23,8 @@ def test_threats_stand_offs_and_rings(tmp_path: Path) -> None:
     output = run(site, *masses, "--require", "iso D", "--picture", picture)
     assert "required: ISO 16933 rating D" in output
     assert output.count("glass: small_window *") == 2
-    assert "left out: shielding" in output
+    assert "left out: surroundings outside the range of the atlas" in output
+    assert "left out: shielding" in run(site, *masses, "--no-shielding")
     assert picture.stat().st_size > 1000
 
 

@@ -120,6 +120,11 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env assess site.toml --screen --glazing window_laminated_6 --wall brick_215"
     " --mass backpack --gas --cells coarse": "--cells uniform --cell 0.5",
     "python -m studies.response angles": "--width 12",
+    # docs/engineers/atlas.md
+    "python -m studies.atlas run --out out/atlas": "--family shadow --groups 1",
+    "python -m studies.atlas scaling": "--family posts",
+    "python -m studies.atlas cases": "--cell 0.5",
+    "python -m studies.atlas sites": "control_room",
     "python -m studies.response peaks": "--cell 0.5",
     "python -m studies.response raised": "--cell 0.5 --distances 10 --heights 0,1.1",
     "python -m studies.response raised --cell 0.25 --distances 5,6.5,8 --heights 0,0.2,2,3,4,5": (

@@ -1,13 +1,17 @@
 """Screening: loads by the curves, the response to them, and the stand-offs."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from blast_env.answers.document import Line
 from blast_env.answers.screening import screening_answer
+from blast_env.atlas import packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
+from blast_env.layout import load_layout
 from blast_env.response import (
     Bay,
     FacadeBay,
@@ -20,9 +24,12 @@ from blast_env.response import (
     respond,
     under_triangle,
 )
-from blast_env.site import Charge, MassPreset, Scenario, tnt_equivalent_kg
+from blast_env.site import Charge, MassPreset, Scenario, load_scenario, tnt_equivalent_kg
 from tests import builders
 from tests.gas_sites import hut, site_document
+
+LOW = Requirement.parsed("low")
+BEST = Path(__file__).parents[2] / "docs" / "data" / "best_found" / "control_room.json"
 
 
 def yard(**charge: object) -> Scenario:
@@ -202,3 +209,76 @@ def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> No
     document["charge"] = [place]
     with pytest.raises(BlastEnvError, match="tnt_kg"):
         Scenario.from_document(document, "yard")
+
+
+def walled_yard(**wall: float) -> Scenario:
+    """Return the yard with a wall between the charge and the west wall of the office."""
+    document = yard(tnt_kg=100.0).model_dump(mode="json", exclude_none=True)
+    own = {"x_m": 18.0, "height_m": 3.0} | wall
+    garden = builders.block("garden_wall", own["x_m"], 10.0, 40, 1, height_m=own["height_m"])
+    document["structures"].append(garden)
+    return Scenario.from_document(document, "walled")
+
+
+def test_a_wall_shields_by_the_atlas_and_is_named() -> None:
+    """The wall of 3 m takes off less than a bay out of sight would have."""
+    site = walled_yard()
+    open_site, plain, found = (
+        screen(own, (), (), atlas).threats[0]
+        for own, atlas in (
+            (yard(tnt_kg=100.0), None),
+            (site, None),
+            (site, packaged_laws()),
+        )
+    )
+    alone, unseen, behind = (
+        next(bay for bay in own.bays if bay.filled.bay.wall == "west")
+        for own in (open_site, plain, found)
+    )
+    assert behind.around == "behind garden_wall 3 m"
+    middle, low, high = behind.factor
+    assert 0.2 < low < middle < high < 1.0
+    share = behind.impulse_pa_s / alone.impulse_pa_s
+    assert share == pytest.approx(max(middle, high / 1.15), rel=1e-9)
+    assert unseen.around == ""
+    parts = [*screening_answer(site, (), screen(site, (), (), packaged_laws()), [LOW])]
+    tables = " ".join(str(part) for part in parts)
+    assert "behind garden_wall 3 m" in tables
+    assert f"x {middle:.2f}, {low:.2f} to {high:.2f}" in tables
+
+
+def test_what_the_atlas_does_not_know_takes_nothing_off_and_says_so() -> None:
+    """A wall against a charge 8 m above the ground is outside the range."""
+    document = walled_yard(height_m=10.0).model_dump(mode="json", exclude_none=True)
+    document["charge"][0]["height_m"] = 8.0
+    document["site"]["air_height_m"] = 20.0
+    site = Scenario.from_document(document, "high")
+    found = screen(site, (), (), packaged_laws())
+    west = next(bay for bay in found.threats[0].bays if bay.filled.bay.wall == "west")
+    assert west.unknown.startswith("behind garden_wall")
+    assert west.factor[0] == pytest.approx(1.0, abs=0.02)
+    lines = [
+        part.text() for part in screening_answer(site, (), found, [LOW]) if isinstance(part, Line)
+    ]
+    assert any("outside the range of the atlas: behind garden_wall 10 m" in line for line in lines)
+
+
+def test_pieces_of_a_layout_shield() -> None:
+    site = load_scenario("control_room").with_facades("window_laminated_6", None)
+    layout = tuple(load_layout(BEST, site))
+    alone, behind = (screen(site, own, (), packaged_laws()).threats[0].bays for own in ((), layout))
+    assert sum(bay.impulse_pa_s for bay in behind) < 0.9 * sum(bay.impulse_pa_s for bay in alone)
+    assert any(bay.around.startswith("behind ") for bay in behind)
+
+
+def test_a_front_on_the_other_side_of_a_street_raises_loads() -> None:
+    document = yard(tnt_kg=100.0).model_dump(mode="json", exclude_none=True)
+    document["structures"].append(builders.block("shops", 2.0, 8.0, 48, 8, height_m=10.0))
+    site = Scenario.from_document(document, "street")
+    west = next(
+        bay
+        for bay in screen(site, (), (), packaged_laws()).threats[0].bays
+        if bay.filled.bay.wall == "west"
+    )
+    assert "a front opposite" in west.around
+    assert west.factor[0] > 1.03

@@ -1,4 +1,4 @@
-"""Screening: the site's answer by Kingery and Bulmash, before any blast."""
+"""Screening: the site's answer by Kingery and Bulmash and the atlas, before any blast."""
 
 from typing import Final
 
@@ -8,6 +8,7 @@ from blast_env.answers.document import Document, Picture
 from blast_env.answers.page import show
 from blast_env.answers.screening import screening_answer
 from blast_env.app.session import NO_FACADE, Session
+from blast_env.atlas import packaged_laws
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import screen
 from blast_env.geometry import Layout
@@ -98,7 +99,7 @@ def _answer(
     from blast_env.plots.figures import png_of
     from blast_env.plots.screening import screening_picture
 
-    found = screen(scenario, layout, masses)
+    found = screen(scenario, layout, masses, packaged_laws())
     rings = png_of(screening_picture(scenario, layout, found), _DPI)
     parts = screening_answer(scenario, layout, found, [required])
     return Document.of([*parts, Picture("stand-offs as rings", rings)])

@@ -1,8 +1,10 @@
 """Screening: the response of facades and the stand-off they need, before any blast.
 
 Loads are Kingery and Bulmash's in the open over rigid ground (`blast_env.curves.over_ground`). A
-bay in sight of the charge has the peak and the impulse of its middle by the angle of incidence, one
-out of sight the side-on values of the same distance. The history is a triangle.
+bay that faces the charge has the peak and the impulse of its middle by the angle of incidence,
+others the side-on values of the same distance. The atlas of shielding (`blast_env.atlas`) changes
+both by what stands around. Without the atlas, a bay out of sight has the
+side-on load. The history is a triangle.
 
 Stand-offs are for normal incidence. They end at both limits of validity: nearer than
 1.7 m/kg^(1/3) walls may be breached, and the curves end at 40 m/kg^(1/3). Those of a charge above
@@ -18,6 +20,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.atlas import Laws, SiteAtlas, Surroundings, Walls
 from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas_validation import bay_middles
@@ -46,10 +49,16 @@ from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 
 LEFT_OUT: Final = (
+    "left out: surroundings outside the range of the atlas, clearing round edges, suction, and"
+    " breaching nearer than 1.7 m/kg^(1/3)"
+)
+"""What screening does not know."""
+
+LEFT_OUT_IN_THE_OPEN: Final = (
     "left out: shielding (a wall out of sight has the side-on load), echoes between walls, clearing"
     " round edges, suction, and breaching nearer than 1.7 m/kg^(1/3)"
 )
-"""What screening does not know."""
+"""What it does not know without the atlas."""
 
 _LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
 RAISED_SCALED_M: Final = 2.9
@@ -77,6 +86,9 @@ class BayScreening:
         peak_pa: Peak of its load.
         impulse_pa_s: Impulse of its load.
         response: Response of its windows and wall panel.
+        around: What stands around it and changes its load; empty in the open.
+        unknown: What stands around it outside the range of the atlas.
+        factor: What that does to the impulse: best estimate, lower and upper end.
     """
 
     filled: FacadeBay
@@ -85,6 +97,9 @@ class BayScreening:
     peak_pa: float
     impulse_pa_s: float
     response: FacadeResponse
+    around: str = ""
+    unknown: str = ""
+    factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -179,12 +194,19 @@ class Screening:
         components: The components of the site and the catalogue, by name.
         present: Names of the components in the site's bays.
         storey_m: The most frequent height of a storey, the span of walls.
+        knows_surroundings: Whether the atlas changed the loads.
     """
 
     threats: tuple[ThreatScreening, ...]
     components: Mapping[str, Glazing | Wall]
     present: frozenset[str]
     storey_m: float
+    knows_surroundings: bool = True
+
+    @property
+    def left_out(self) -> str:
+        """What this screening does not know."""
+        return LEFT_OUT if self.knows_surroundings else LEFT_OUT_IN_THE_OPEN
 
     @cached_property
     def stand_offs(self) -> Mapping[str, tuple[StandOff, ...]]:
@@ -218,11 +240,13 @@ def screen(
     scenario: Scenario,
     layout: Sequence[Element] = (),
     threats: Iterable[MassPreset] = (),
+    atlas: Laws | None = None,
 ) -> Screening:
     """Return the response of a site's facades before any blast, and the stand-offs they need.
 
-    Measures of the layout and the vehicles it stops count. Its pieces cut lines of sight, but do
-    not shield. Given threats may go off at every place of the site's charges, in the place of
+    Measures of the layout, the vehicles it stops, and its pieces count. Loads are changed by the
+    laws of an atlas (`blast_env.atlas.laws`); without one, pieces cut lines of sight, but do not
+    shield. Given threats may go off at every place of the site's charges, in the place of
     these.
 
     Raises:
@@ -242,6 +266,7 @@ def screen(
             " [structures.facade], or give --glazing or --wall"
         )
     facade = _Facade.of(scenario, layout, bays)
+    changed = None if atlas is None else SiteAtlas(facade.site, facade.walls, atlas)
     screened = []
     known_places: dict[object, Ways] = {}  # threats that differ in mass alone share them
     for name, own in sources.items():
@@ -249,7 +274,7 @@ def screen(
         key = tuple((place.position_m, place.height_m) for place in places)
         if key not in known_places:
             known_places[key] = facade.seen_from(places)
-        screened.append(_screened(name, facade, places, known_places[key]))
+        screened.append(_screened(name, facade, places, known_places[key], changed))
     named_bays = scenario.named_bays(layout)
     storeys = [bay.bay.height_m for bay in bays]
     return Screening(
@@ -259,6 +284,7 @@ def screen(
             name for named_bay in named_bays for name in (named_bay.glazing, named_bay.wall) if name
         ),
         max(set(storeys), key=storeys.count),
+        atlas is not None,
     )
 
 
@@ -350,6 +376,18 @@ class _Facade:
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
         return cls(kept, before_m[free], normals[free], site)
 
+    @property
+    def walls(self) -> Walls:
+        """The bays on their walls."""
+        high_m: dict[str, float] = {}
+        for outline in self.site.structures:
+            tops_m = [block.height_m for block in outline.blocks if block.height_m is not None]
+            high_m[outline.name] = max(tops_m, default=0.0)
+        names = tuple(own.bay.structure for own in self.bays)
+        return Walls(
+            self.middles_m, self.outward, names, np.array([high_m[name] for name in names])
+        )
+
     @cached_property
     def kinds(self) -> tuple[IntArray, list[list[Pane | Panel]]]:
         """Number of the kind of each bay, and the parts of each: equal parts respond equally."""
@@ -440,15 +478,32 @@ def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
     return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
 
 
-def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) -> ThreatScreening:
+def _screened(
+    name: str,
+    facade: _Facade,
+    places: Sequence[Charge],
+    ways: Ways,
+    atlas: SiteAtlas | None,
+) -> ThreatScreening:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
     _, tnt_kg, height_m = places[0]
-    peaks, impulses = (in_the_open(part, ways, tnt_kg, height_m) for part in _LOADS)
+    around: list[Surroundings] = []
+    seen = ways
+    if atlas is not None:
+        scale = float(np.cbrt(tnt_kg))
+        around = [atlas.around((*own.position_m, own.height_m), scale) for own in places]
+        # What hides a bay that faces the charge is in the factors; outside the atlas's range it
+        # takes nothing off.
+        seen = ways._replace(seen=np.stack([own.faces for own in around]))
+    peaks, impulses = (in_the_open(part, seen, tnt_kg, height_m) for part in _LOADS)
+    if around:
+        factors = np.stack([own.factors.counted for own in around])
+        impulses, peaks = impulses * factors[..., 0], peaks * factors[..., 1]
     numbers, parts = facade.kinds
     damage = np.zeros(peaks.shape)
-    for kind, own in enumerate(parts):
+    for kind, own_parts in enumerate(parts):
         which = numbers == kind
-        damage[:, which] = _tabulated(own, peaks[:, which], impulses[:, which])
+        damage[:, which] = _tabulated(own_parts, peaks[:, which], impulses[:, which])
     order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
     bays = []
@@ -456,7 +511,17 @@ def _screened(name: str, facade: _Facade, places: Sequence[Charge], ways: Ways) 
         load = float(peaks[worst, index]), float(impulses[worst, index])
         response = respond([filled], *triangle(*load))
         away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
-        bays.append(BayScreening(filled, float(away_m), bool(is_seen), *load, response))
+        found = BayScreening(filled, float(away_m), bool(is_seen), *load, response)
+        if around:
+            own = around[worst]
+            middle, low, high = (float(part[index, 0]) for part in own.factors[:3])
+            found = replace(
+                found,
+                around=own.words[index],
+                unknown=own.unknown[index],
+                factor=(middle, low, high),
+            )
+        bays.append(found)
     return ThreatScreening(name, places[worst], len(places), tuple(bays))
 
 

@@ -1,0 +1,23 @@
+"""The atlas of shielding: what walls, rows, fronts and shadows do to the load of a bay."""
+
+from blast_env.atlas.between import Row, numbers_between, rows_between
+from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.laws import Factors, FamilyError, Law, Laws, packaged_laws
+from blast_env.atlas.shadow import numbers_of_shadow
+from blast_env.atlas.surroundings import SiteAtlas, Surroundings, Walls
+
+__all__ = [
+    "Factors",
+    "FamilyError",
+    "Law",
+    "Laws",
+    "Row",
+    "SiteAtlas",
+    "Surroundings",
+    "Walls",
+    "numbers_between",
+    "numbers_of_echoes",
+    "numbers_of_shadow",
+    "packaged_laws",
+    "rows_between",
+]

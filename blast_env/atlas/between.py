@@ -1,0 +1,180 @@
+"""Obstacles between a charge and a bay, as dimensionless numbers.
+
+An obstacle takes away a part of the zone through which the wave reaches the bay: a bell around the
+straight way, of variance `width * d1 d2 / (d1 + d2)` in the plane of the obstacle, where d1 and d2
+are its distances from the charge and from the bay, and `width` is a difference of ways (Fresnel's
+zones). The ground mirrors it. What obstacles take away of several bells, narrow and wide, their
+distances and their thickness are the numbers of a law. Without an obstacle nothing is taken away.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray, IntArray
+
+WIDTHS: Final = (0.03, 0.2, 1.0)
+"""Differences of ways that make the bells, m/kg^(1/3)."""
+
+_TOGETHER: Final = 0.3
+"""Obstacles whose middles are nearer to each other than this along the normal of the bay's wall,
+m/kg^(1/3), stand in one row."""
+
+_LEAST: Final = 0.02  # m/kg^(1/3): distances and bells are at least so large
+_NOTHING: Final = 1e-3  # share of a bell that is not worth a row
+_BEFORE: Final = 0.04  # m/kg^(1/3) before a wall: what lies behind that does not shield it
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A row of obstacles, seen from several bays of a wall.
+
+    Attributes:
+        taken: Share of each bell that it takes away (bays, widths).
+        from_charge: Distance from the charge, m/kg^(1/3) (bays,).
+        from_bay: Distance from the bay (bays,).
+        thickness: Way of the line of sight through it (bays,).
+        members: The obstacles, by their indices.
+    """
+
+    taken: FloatArray
+    from_charge: FloatArray
+    from_bay: FloatArray
+    thickness: FloatArray
+    members: IntArray
+
+
+def rows_between(
+    charge: FloatArray, bays: FloatArray, normal: FloatArray, boxes: FloatArray
+) -> list[Row]:
+    """Return the rows of obstacles between a charge and the bays of one wall.
+
+    Args:
+        charge: Place of the charge, m/kg^(1/3) (3,).
+        bays: Middles of the bays (bays, 3).
+        normal: Outward normal of their wall (3,).
+        boxes: Low x, y, high x, y, base and top of each obstacle (boxes, 6).
+    """
+    if not len(boxes) or not len(bays):
+        return []
+    corners = np.stack(
+        [boxes[:, [0, 1]], boxes[:, [2, 1]], boxes[:, [2, 3]], boxes[:, [0, 3]]], axis=1
+    )
+    wall = float(bays[0] @ normal)
+    out = corners @ normal[:2] - wall  # (boxes, 4), distance before the wall
+    before = np.flatnonzero(out.max(axis=1) > _BEFORE)
+    if not len(before):
+        return []
+    parts = _Parts.of(charge, bays, boxes[before], corners[before])
+    middle = 0.5 * (out[before].min(axis=1) + out[before].max(axis=1))
+    order = np.argsort(middle)
+    starts = np.flatnonzero(np.diff(middle[order]) > _TOGETHER) + 1
+    found = (parts.row(members, before[members]) for members in np.split(order, starts))
+    return [row for row in found if row.taken.max() > _NOTHING]
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What each obstacle takes of the bells of each bay (bays, boxes, ...)."""
+
+    taken: FloatArray
+    along: FloatArray
+    way: FloatArray
+    thickness: FloatArray
+
+    @classmethod
+    def of(
+        cls, charge: FloatArray, bays: FloatArray, boxes: FloatArray, corners: FloatArray
+    ) -> "_Parts":
+        from scipy.special import ndtr  # takes a while to import
+
+        # (1) Coordinates along the straight way in plan, s, and across it, e.
+        plan = bays[:, :2] - charge[:2]
+        length = np.maximum(np.linalg.norm(plan, axis=1), _LEAST)
+        unit = plan / length[:, np.newaxis]
+        from_charge = corners - charge[:2]  # (boxes, 4, 2)
+        s = np.einsum("bcx,nx->nbc", from_charge, unit)
+        e = np.einsum("bcx,nx->nbc", from_charge, np.stack([-unit[:, 1], unit[:, 0]], axis=1))
+        # (2) Where the way enters and leaves the box, or else its corner nearest to the way.
+        low, high = boxes[:, :2] - charge[:2], boxes[:, 2:4] - charge[:2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = low[np.newaxis] / unit[:, np.newaxis]
+            last = high[np.newaxis] / unit[:, np.newaxis]
+        inside = (low < 0.0) & (high > 0.0)  # for ways along an axis
+        level = np.abs(unit)[:, np.newaxis] < 1e-9
+        near = np.where(level, np.where(inside, -np.inf, np.inf), np.minimum(first, last))
+        far = np.where(level, np.where(inside, np.inf, -np.inf), np.maximum(first, last))
+        enter, leave = near.max(axis=2), far.min(axis=2)
+        cuts = enter < leave
+        whole = length[:, np.newaxis]
+        enter, leave = np.clip(enter, 0.0, whole), np.clip(leave, 0.0, whole)
+        nearest = np.take_along_axis(s, np.abs(e).argmin(axis=2)[..., np.newaxis], axis=2)[..., 0]
+        along = np.where(cuts, 0.5 * (enter + leave), nearest)
+        thickness = np.where(cuts, leave - enter, 0.0)
+        valid = (along > 0.0) & (along < whole) & (~cuts | (leave > enter))
+        # (3) The bell there, and its shares across and up; the ground mirrors it.
+        share = np.clip(along / whole, 0.0, 1.0)
+        slope = np.sqrt(1.0 + ((bays[:, 2] - charge[2]) / length) ** 2)[:, np.newaxis]
+        d1 = np.maximum(along * slope, _LEAST)
+        d2 = np.maximum((whole - along) * slope, _LEAST)
+        line = charge[2] + (bays[:, 2, np.newaxis] - charge[2]) * share
+        taken = np.empty((*along.shape, len(WIDTHS)))
+        left, right = e.min(axis=2), e.max(axis=2)
+        for k, width in enumerate(WIDTHS):
+            bell = np.maximum(np.sqrt(width * d1 * d2 / (d1 + d2)), _LEAST)
+            across = ndtr(right / bell) - ndtr(left / bell)
+
+            def below(height: FloatArray, bell: FloatArray = bell) -> FloatArray:
+                mirrored = ndtr((height - line) / bell) + ndtr((height + line) / bell) - 1.0
+                return np.asarray(np.maximum(mirrored, 0.0))
+
+            up = below(boxes[:, 5]) - below(boxes[:, 4])
+            taken[..., k] = np.where(valid, across * up, 0.0)
+        return cls(taken, d1, d2, thickness)
+
+    def row(self, members: IntArray, indices: IntArray) -> Row:
+        """Return a row of some of the obstacles."""
+        taken = self.taken[:, members]
+        weight = taken[..., -1] + 1e-9
+        weight = weight / weight.sum(axis=1, keepdims=True)
+
+        def mean(values: FloatArray) -> FloatArray:
+            return np.asarray((values[:, members] * weight).sum(axis=1))
+
+        return Row(
+            np.minimum(taken.sum(axis=1), 1.0),
+            mean(self.along),
+            mean(self.way),
+            mean(self.thickness),
+            indices,
+        )
+
+
+def numbers_between(row: Row, charge: FloatArray) -> FloatArray:
+    """Return the numbers of the law of one row (bays, numbers), see `NUMBERS`.
+
+    Args:
+        row: The row.
+        charge: Place of the charge, m/kg^(1/3) (3,).
+    """
+    return np.column_stack(
+        [
+            row.taken,
+            np.log(row.from_charge),
+            np.log(row.from_bay),
+            np.sqrt(row.thickness),
+            np.full(len(row.taken), charge[2]),
+        ]
+    )
+
+
+NUMBERS: Final[Sequence[str]] = (
+    *(f"taken_{width:g}" for width in WIDTHS),
+    "ln_from_charge",
+    "ln_from_bay",
+    "root_thickness",
+    "charge_height",
+)
+"""Names of the columns of `numbers_between`."""

@@ -1,0 +1,148 @@
+"""Fronts that throw a wave back on a bay, as dimensionless numbers.
+
+A wall that faces both the charge and the bay has an image of the charge behind it. The image counts
+by the share of its zone (a bell around the way, as between obstacles) that meets the wall, by its
+distance and by its angle of incidence on the bay, both relative to those of the charge. Walls that
+face the bay's own wall are opposite it, those at a right angle to it are beside it, on its left or
+on its right. A wave that goes to and fro between walls has its first images as a measure.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+
+WIDTH: Final = 0.2
+"""Difference of ways that makes the bell, m/kg^(1/3)."""
+
+_EXPONENT: Final = 1.1  # of the distance: reflected impulses fall by it
+_SLANT: Final = 0.35  # side-on over reflected impulse, about
+_LEAST: Final = 0.02
+_CLEAR: Final = 1e-6
+
+NUMBERS: Final[Sequence[str]] = (
+    "opposite",
+    "beside",
+    "both_sides",
+    "near_opposite",
+    "near_beside",
+    "ln_distance",
+    "cosine",
+    "bay_height",
+    "charge_height",
+    "building_height",
+)
+"""Names of the columns of `numbers_of_echoes`."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Walls of boxes: a point on each, its normal, its ends along it, and its height."""
+
+    at: FloatArray
+    axis: FloatArray
+    outward: FloatArray
+    low: FloatArray
+    high: FloatArray
+    base: FloatArray
+    top: FloatArray
+
+    @classmethod
+    def of(cls, boxes: FloatArray) -> "_Faces":
+        count = len(boxes)
+        parts = [(0, 0, -1.0), (0, 2, 1.0), (1, 1, -1.0), (1, 3, 1.0)]
+        return cls(
+            at=np.concatenate([boxes[:, column] for _, column, _ in parts]),
+            axis=np.repeat([axis for axis, *_ in parts], count),
+            outward=np.repeat([side for *_, side in parts], count),
+            low=np.concatenate([boxes[:, 1 - axis] for axis, *_ in parts]),
+            high=np.concatenate([boxes[:, 3 - axis] for axis, *_ in parts]),
+            base=np.tile(boxes[:, 4], 4),
+            top=np.tile(boxes[:, 5], 4),
+        )
+
+
+def numbers_of_echoes(
+    charge: FloatArray,
+    bays: FloatArray,
+    normal: FloatArray,
+    boxes: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Return the numbers of the law of echoes (bays, numbers), see `NUMBERS`.
+
+    Args:
+        charge: Place of the charge, m/kg^(1/3) (3,).
+        bays: Middles of the bays (bays, 3).
+        normal: Outward normal of their wall (3,).
+        boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
+        high: Height of the building of each bay (bays,).
+    """
+    from scipy.special import ndtr  # takes a while to import
+
+    way = charge - bays
+    distance = np.maximum(np.linalg.norm(way, axis=1), _LEAST)
+    cosine = way @ normal / distance
+    sums = np.zeros((len(bays), 3))
+    near = np.zeros((len(bays), 3))
+    if len(boxes):
+        faces = _Faces.of(boxes)
+        # (1) Walls that face the charge, and bays before them.
+        before_charge = faces.outward * (charge[faces.axis] - faces.at)
+        before_bay = faces.outward * (bays[:, faces.axis] - faces.at)
+        valid = (before_charge > _CLEAR) & (before_bay > _CLEAR)
+        # (2) The image, where its way crosses the wall, and the share of the bell on the wall.
+        image = np.broadcast_to(charge, (len(bays), len(faces.at), 3)).copy()
+        index = np.arange(len(faces.at))
+        image[:, index, faces.axis] = 2.0 * faces.at - charge[faces.axis]
+        ways = image - bays[:, np.newaxis]
+        longer = np.linalg.norm(ways, axis=2)
+        total = np.maximum(before_charge + before_bay, _LEAST)
+        share = np.clip(before_charge / total, 0.0, 1.0)
+        crossing = image - ways * share[..., np.newaxis]
+        d1, d2 = share * longer, (1.0 - share) * longer
+        bell = np.maximum(np.sqrt(WIDTH * d1 * d2 / np.maximum(longer, _LEAST)), _LEAST)
+        slant = np.maximum(total / np.maximum(longer, _LEAST), 0.1)
+        across = crossing[:, index, 1 - faces.axis]
+        wide = ndtr((faces.high - across) * slant / bell) - ndtr(
+            (faces.low - across) * slant / bell
+        )
+        up = crossing[..., 2]
+
+        def below(height: FloatArray) -> FloatArray:
+            return np.asarray(ndtr((height - up) / bell) + ndtr((height + up) / bell) - 1.0)
+
+        met = np.where(valid, wide * np.maximum(below(faces.top) - below(faces.base), 0.0), 0.0)
+        # (3) Its weight by distance and incidence, relative to the charge itself.
+        own = np.maximum(ways @ normal / np.maximum(longer, _LEAST), 0.0)
+        incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
+            _SLANT + (1.0 - _SLANT) * np.maximum(cosine, 0.0)[:, np.newaxis] ** 2
+        )
+        weight = met * incidence * (distance[:, np.newaxis] / longer) ** _EXPONENT
+        later = np.maximum(longer - distance[:, np.newaxis], _LEAST)
+        closeness = met * np.log1p(distance[:, np.newaxis] / later)
+        # (4) Opposite, left and right of the bay's wall.
+        outward = np.zeros((len(faces.at), 2))
+        outward[index, faces.axis] = faces.outward
+        facing = outward @ normal[:2]
+        turned = outward @ np.array([-normal[1], normal[0]])
+        for k, chosen in enumerate((facing < -0.5, turned > 0.5, turned < -0.5)):
+            sums[:, k] = weight[:, chosen].sum(axis=1)
+            near[:, k] = closeness[:, chosen].sum(axis=1)
+    return np.column_stack(
+        [
+            sums[:, 0],
+            sums[:, 1] + sums[:, 2],
+            sums[:, 1] * sums[:, 2],
+            near[:, 0],
+            near[:, 1] + near[:, 2],
+            np.log(distance),
+            cosine,
+            bays[:, 2],
+            np.full(len(bays), charge[2]),
+            high,
+        ]
+    )

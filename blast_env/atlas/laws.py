@@ -1,0 +1,206 @@
+"""Laws of the atlas: factors on the impulse and the peak of a bay, with intervals and ranges.
+
+A law is a small network of dimensionless numbers times a gate. The gate is 0 where there is no
+obstacle, so that the factor is 1 there, and the interval has no width. Coefficients were fitted to
+blasts of gas dynamics and are in `data/laws.json`, which `python -m studies.atlas fit` writes.
+"""
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Annotated, Final, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from blast_env.arrays import BoolArray, FloatArray
+
+LOADS: Final = ("impulse", "peak")
+"""Order of the loads in arrays of factors."""
+
+_SMALL: Final = 0.02
+"""Gate below which an obstacle does nothing, in range or not."""
+
+TOLERATED: Final = 1.15
+"""What a load may be above the one that counts, see `Factors.counted`."""
+
+_BEYOND: Final = 1e-6
+
+
+class Factors(NamedTuple):
+    """Factors on the loads of bays.
+
+    Attributes:
+        middle: Best estimate (bays, 2), impulse and peak.
+        low: Lower end of the interval of 90 % (bays, 2).
+        high: Its upper end.
+        in_range: Whether the law knows such surroundings (bays,).
+    """
+
+    middle: FloatArray
+    low: FloatArray
+    high: FloatArray
+    in_range: BoolArray
+
+    @classmethod
+    def none(cls, bays: int) -> "Factors":
+        """Return factors of 1 for a number of bays."""
+        one = np.ones((bays, len(LOADS)))
+        return cls(one, one, one, np.ones(bays, dtype=bool))
+
+    @property
+    def counted(self) -> FloatArray:
+        """Factors for the load (bays, 2).
+
+        Of designs left out of the fit, one bay in twenty has over 1.15 times as much.
+        """
+        return np.maximum(self.middle, self.high / TOLERATED)
+
+    def times(self, other: "Factors") -> "Factors":
+        """Return the products of both."""
+        return Factors(
+            self.middle * other.middle,
+            self.low * other.low,
+            self.high * other.high,
+            self.in_range & other.in_range,
+        )
+
+    def least(self, other: "Factors") -> "Factors":
+        """Return the smaller one of both for each bay and load."""
+        first = self.middle <= other.middle
+        return Factors(
+            np.where(first, self.middle, other.middle),
+            np.where(first, self.low, other.low),
+            np.where(first, self.high, other.high),
+            self.in_range & other.in_range,
+        )
+
+    def where_known(self) -> "Factors":
+        """Return the same, with 1 where the law does not know the surroundings."""
+        known = self.in_range[:, np.newaxis]
+        middle, low, high = (np.where(known, own, 1.0) for own in self[:3])
+        return Factors(middle, low, high, self.in_range)
+
+
+class FamilyError(BaseModel):
+    """Errors of a law on the designs of one family that were left out of its fit.
+
+    Attributes:
+        title: The family, for readers.
+        blasts: Number of blasts with an obstacle.
+        bays: Number of their bays.
+        before: Spread (root mean square) of ln(factor) of impulse and peak.
+        error: The same of what the law leaves.
+        inside: Share of the bays in the interval.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str
+    blasts: int
+    bays: int
+    before: tuple[float, float]
+    error: tuple[float, float]
+    inside: tuple[float, float]
+
+
+class Law(BaseModel):
+    """One law.
+
+    Attributes:
+        numbers: Names of its numbers.
+        gates: Share of each number in the gate.
+        widths: Share of each number in the width of the intervals.
+        least: Least value of each number in the blasts.
+        most: Largest one.
+        centre: Values taken off each number.
+        scale: Divisors of the rest.
+        inner: Weights of the hidden layer (numbers, hidden).
+        inner_shift: Its offsets (hidden,).
+        outer: Weights of the output (hidden, loads).
+        outer_shift: Its offsets (loads,).
+        below: Ends of the intervals below ln(factor), over the width (loads,).
+        above: Ends above it.
+        families: Errors by family.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    numbers: tuple[str, ...]
+    gates: tuple[float, ...]
+    widths: tuple[float, ...]
+    least: tuple[float, ...]
+    most: tuple[float, ...]
+    centre: tuple[float, ...]
+    scale: tuple[float, ...]
+    inner: tuple[tuple[float, ...], ...]
+    inner_shift: tuple[float, ...]
+    outer: tuple[tuple[float, ...], ...]
+    outer_shift: tuple[float, ...]
+    below: tuple[float, float]
+    above: tuple[float, float]
+    families: Mapping[str, FamilyError]
+
+    def gate(self, numbers: FloatArray) -> FloatArray:
+        """Return how much of an obstacle there is, 0 for none (bays,)."""
+        return np.asarray(np.clip(numbers @ np.array(self.gates), 0.0, 2.0))
+
+    def width(self, numbers: FloatArray) -> FloatArray:
+        """Return the width of intervals, in units of their ends: 0 without an obstacle (bays,)."""
+        return np.asarray(np.sqrt(self.gate(numbers)) * (1.0 + numbers @ np.array(self.widths)))
+
+    def log_factors(self, numbers: FloatArray) -> FloatArray:
+        """Return the logarithms of the factors, in range or not (bays, loads)."""
+        hidden = np.tanh(
+            ((numbers - np.array(self.centre)) / np.array(self.scale)) @ np.array(self.inner)
+            + np.array(self.inner_shift)
+        )
+        net = hidden @ np.array(self.outer) + np.array(self.outer_shift)
+        return np.asarray(self.gate(numbers)[:, np.newaxis] * net)
+
+    def in_range(self, numbers: FloatArray) -> BoolArray:
+        """Return whether all numbers lie between those of the blasts (bays,)."""
+        low, high = np.array(self.least) - _BEYOND, np.array(self.most) + _BEYOND
+        inside = ((numbers >= low) & (numbers <= high)).all(axis=1)
+        return np.asarray(inside | (self.gate(numbers) < _SMALL))
+
+    def factors(self, numbers: FloatArray) -> Factors:
+        """Return the factors on the loads of bays, given their numbers (bays, numbers).
+
+        Outside the range they are those of the nearest numbers in it.
+        """
+        inside = self.in_range(numbers)
+        numbers = np.clip(numbers, np.array(self.least), np.array(self.most))
+        middle = self.log_factors(numbers)
+        width = self.width(numbers)[:, np.newaxis]
+        low, high = middle - width * np.array(self.below), middle + width * np.array(self.above)
+        return Factors(np.exp(middle), np.exp(low), np.exp(high), inside)
+
+
+class Laws(BaseModel):
+    """The laws of the atlas.
+
+    Attributes:
+        between: Of obstacles between charge and bay.
+        opposite: Of fronts opposite a bay that throw the wave back: streets, a front behind the
+            charge.
+        beside: Of walls beside it: courts, re-entrant corners, the end of a street.
+        shadow: Of walls that face away, relative to the side-on load.
+        about: Origin: command, versions, engine, blasts.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    between: Law
+    opposite: Law
+    beside: Law
+    shadow: Law
+    about: Annotated[Mapping[str, str], Field(default_factory=dict)]
+
+
+@cache
+def packaged_laws() -> Laws:
+    """Return the packaged laws."""
+    text = files("blast_env.atlas").joinpath("data", "laws.json").read_text("utf-8")
+    return Laws.model_validate(json.loads(text))

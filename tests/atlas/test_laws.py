@@ -1,0 +1,147 @@
+"""The packaged laws of the atlas: limits, order, continuity, ranges, and two blasts."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blast_env.arrays import FloatArray
+from blast_env.atlas import (
+    Factors,
+    numbers_between,
+    numbers_of_echoes,
+    packaged_laws,
+    rows_between,
+)
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.site import Scenario
+from tests import builders
+from tests.gas_sites import site_document
+
+CHARGE = np.zeros(3)
+BAYS = np.array([[2.2, 0.0, 0.3], [2.2, 0.7, 0.3], [2.2, 0.0, 0.9]])
+TOWARDS = np.array([-1.0, 0.0, 0.0])
+HIGH = np.full(len(BAYS), 1.3)
+
+
+def wall(high: float, at: float = 0.7, long: float = 4.0, thick: float = 0.1) -> FloatArray:
+    return np.array([[at, -0.5 * long, at + thick, 0.5 * long, 0.0, high]])
+
+
+def behind(boxes: FloatArray) -> Factors:
+    found = Factors.none(len(BAYS))
+    for row in rows_between(CHARGE, BAYS, TOWARDS, boxes):
+        own = packaged_laws().between.factors(numbers_between(row, CHARGE))
+        found = found.least(own.where_known())
+    return found
+
+
+def test_without_an_obstacle_the_factor_is_exactly_one() -> None:
+    nothing = np.zeros((0, 6))
+    far_behind = wall(1.0) + np.array([5.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+    for boxes in (nothing, far_behind):
+        found = behind(boxes)
+        assert (found.low == 1.0).all()
+        assert (found.high == 1.0).all()
+    numbers = numbers_of_echoes(CHARGE, BAYS, TOWARDS, nothing, HIGH)
+    for law in (packaged_laws().opposite, packaged_laws().beside):
+        found = law.factors(numbers)
+        assert np.stack(found[:3]) == pytest.approx(1.0, abs=1e-12)
+        assert found.in_range.all()
+
+
+def test_a_vanishing_wall_does_nothing() -> None:
+    found = behind(wall(0.001))
+    assert found.middle == pytest.approx(1.0, abs=0.01)
+    assert (found.high - found.low).max() < 0.05
+
+
+@given(st.floats(0.05, 1.4), st.floats(0.5, 4.0), st.floats(0.01, 0.5))
+def test_a_larger_wall_takes_more_of_every_bell(high: float, long: float, more: float) -> None:
+    (row,) = rows_between(CHARGE, BAYS, TOWARDS, wall(high, long=long))
+    for larger in (wall(high + more, long=long), wall(high, long=long + more)):
+        (other,) = rows_between(CHARGE, BAYS, TOWARDS, larger)
+        assert (other.taken >= row.taken - 1e-12).all()
+
+
+def test_higher_walls_protect_more_and_gaps_less() -> None:
+    left = [float(behind(wall(high)).middle[:, 0].mean()) for high in (0.2, 0.4, 0.65, 0.9)]
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 0.6 < 0.7 < left[0] < 0.9
+    half = wall(0.65)
+    lower, upper = half.copy(), half.copy()
+    lower[0, 3], upper[0, 1] = -0.25, 0.25
+    assert behind(np.concatenate([lower, upper])).middle[0, 0] > left[2] + 0.05
+
+
+def test_factors_are_continuous() -> None:
+    heights = np.linspace(0.05, 1.4, 60)
+    found = np.log([behind(wall(float(high))).middle[:, 0] for high in heights])
+    assert np.abs(np.diff(found, axis=0)).max() < 0.1
+
+
+def test_intervals_hold_the_estimate_and_the_counted_load_is_on_the_safe_side() -> None:
+    found = behind(wall(0.65))
+    assert (found.low < found.middle).all()
+    assert (found.middle < found.high).all()
+    assert (found.counted >= found.middle).all()
+
+
+def test_outside_its_range_the_law_takes_nothing_off() -> None:
+    raised = np.array([0.0, 0.0, 4.0])
+    (row,) = rows_between(raised, BAYS, TOWARDS, wall(6.0))
+    own = packaged_laws().between.factors(numbers_between(row, raised))
+    assert not own.in_range.any()
+    assert (own.where_known().middle == 1.0).all()
+
+
+@pytest.mark.parametrize(("law", "boxes"), [
+    ("opposite", [[-0.9, -3.0, -0.5, 3.0, 0.0, 1.5]]),
+    ("beside", [[-0.5, 0.9, 2.2, 1.3, 0.0, 1.5], [-0.5, -1.3, 2.2, -0.9, 0.0, 1.5]]),
+])  # fmt: skip
+def test_fronts_throw_waves_back(law: str, boxes: list[list[float]]) -> None:
+    numbers = numbers_of_echoes(CHARGE, BAYS[:1], TOWARDS, np.array(boxes), HIGH[:1])
+    found = getattr(packaged_laws(), law).factors(numbers)
+    assert found.middle[0, 0] > 1.1
+    lower = np.array(boxes) * np.array([1, 1, 1, 1, 1, 0.02])
+    low = getattr(packaged_laws(), law).factors(
+        numbers_of_echoes(CHARGE, BAYS[:1], TOWARDS, lower, HIGH[:1])
+    )
+    assert low.middle[0, 0] < 1.06
+
+
+def test_the_errors_of_the_fit_are_in_the_file() -> None:
+    for law in (packaged_laws().between, packaged_laws().opposite, packaged_laws().shadow):
+        for family in law.families.values():
+            assert family.error[0] < 0.6 * family.before[0]
+
+
+def house(with_wall: bool) -> Scenario:
+    """Return 100 kg, 10 m before a house of 6 m, with a wall of 3 m at 3 m or without."""
+    front = {"height_m": 6.0, "protected": True, "faces": ["west"]}
+    structures = [builders.block("house", 14.0, 8.0, 24, 4, **front)]
+    if with_wall:
+        structures.append(builders.block("wall", 7.0, 4.0, 40, 1, height_m=3.0))
+    document = site_document(
+        site={"width_m": 20.0, "height_m": 28.0, "air_height_m": 12.0},
+        charge=[builders.point(4.0, 14.0, 100.0)],
+        structures=structures,
+        gauges=[],
+    )
+    del document["build_zone"]
+    return Scenario.from_document(document, "house")
+
+
+def test_a_wall_by_gas_lies_in_the_interval_of_the_law() -> None:
+    engine = GasEngine(cell_m=0.5)
+    alone, behind_it = (
+        GasBlast(house(own), engine=engine).run().impulse("house").pa_s for own in (False, True)
+    )
+    scale = 100.0 ** (1 / 3)
+    bays = np.array([[10.0, y, z] for y in (-4.5, -1.5, 1.5, 4.5) for z in (1.5, 4.5)]) / scale
+    box = np.array([[3.0, -10.0, 3.5, 10.0, 0.0, 3.0]]) / scale
+    (row,) = rows_between(CHARGE, bays, TOWARDS, box)
+    found = packaged_laws().between.factors(numbers_between(row, CHARGE))
+    low, high = (float(part[:, 0].mean()) for part in (found.low, found.high))
+    assert low < behind_it / alone < high
+    assert high / low < 2.0
