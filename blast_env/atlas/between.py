@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray, IntArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 
 WIDTHS: Final = (0.03, 0.2, 1.0)
 """Differences of ways that make the bells, m/kg^(1/3)."""
@@ -46,6 +46,12 @@ class Row:
     members: IntArray
 
 
+def lies_before(bays: FloatArray, normal: FloatArray, boxes: FloatArray) -> BoolArray:
+    """Return whether a part of each box lies before the wall of some bays (boxes,)."""
+    out = np.maximum(boxes[:, [0, 1]] * normal[:2], boxes[:, [2, 3]] * normal[:2]).sum(axis=1)
+    return np.asarray(out - float(bays[0] @ normal) > _BEFORE)
+
+
 def rows_between(
     charge: FloatArray, bays: FloatArray, normal: FloatArray, boxes: FloatArray
 ) -> list[Row]:
@@ -59,16 +65,13 @@ def rows_between(
     """
     if not len(boxes) or not len(bays):
         return []
-    corners = np.stack(
-        [boxes[:, [0, 1]], boxes[:, [2, 1]], boxes[:, [2, 3]], boxes[:, [0, 3]]], axis=1
-    )
-    wall = float(bays[0] @ normal)
-    out = corners @ normal[:2] - wall  # (boxes, 4), distance before the wall
-    before = np.flatnonzero(out.max(axis=1) > _BEFORE)
+    before = np.flatnonzero(lies_before(bays, normal, boxes))
     if not len(before):
         return []
-    parts = _Parts.of(charge, bays, boxes[before], corners[before])
-    middle = 0.5 * (out[before].min(axis=1) + out[before].max(axis=1))
+    own = boxes[before]
+    corners = np.stack([own[:, [0, 1]], own[:, [2, 1]], own[:, [2, 3]], own[:, [0, 3]]], axis=1)
+    parts = _Parts.of(charge, bays, own, corners)
+    middle = 0.5 * (own[:, [0, 1]] + own[:, [2, 3]]) @ normal[:2]
     order = np.argsort(middle)
     starts = np.flatnonzero(np.diff(middle[order]) > _TOGETHER) + 1
     found = (parts.row(members, before[members]) for members in np.split(order, starts))

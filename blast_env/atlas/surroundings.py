@@ -8,6 +8,7 @@ it.
 
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -40,6 +41,11 @@ class Solid:
     boxes: FloatArray
     names: tuple[str, ...]
     structures: tuple[str, ...]
+
+    @cached_property
+    def is_building(self) -> BoolArray:
+        """Whether each box is no piece of a layout (boxes,)."""
+        return np.array([name != BARRIER for name in self.structures], dtype=bool)
 
     @classmethod
     def of(cls, site: BlastSite) -> "Solid":
@@ -157,7 +163,11 @@ class SiteAtlas:
         for own, name in governing:
             counts = own.middle[:, 0] <= factors.middle[:, 0]  # the row that takes most
             _note(words, unknown, name, own, counts)
-        boxes = solid.boxes[[name != BARRIER for name in solid.structures]]
+        boxes = solid.boxes[
+            solid.is_building & between.lies_before(wall.middles, wall.normal, solid.boxes)
+        ]
+        if not len(boxes):
+            return Surroundings(factors, np.ones(count, bool), tuple(words), tuple(unknown))
         numbers = echoes.numbers_of_echoes(wall.charge, wall.middles, wall.normal, boxes, wall.high)
         for law, name in (
             (self._laws.opposite, "a front opposite"),

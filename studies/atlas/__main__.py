@@ -20,11 +20,12 @@ from blast_env.tables import markdown_table
 from blast_env.units import MODULE_SIDE_M
 from studies.atlas import findings
 from studies.atlas.families import FAMILIES
-from studies.atlas.fitting import fit_all
+from studies.atlas.fitting import RECIPES, fit_all
 from studies.atlas.runs import (
     COARSE,
     COLUMNS,
     FINE,
+    groups_in,
     groups_of,
     rounds,
     run_group,
@@ -142,6 +143,32 @@ def cells(data: Data = DATA) -> None:
         headers = ("family", "blasts", "impulse, mean", "peak, mean")
         more = ("impulse, spread of ln", "peak, spread of ln")
         print_line(markdown_table((*headers, *more), findings.cell_rows(*both)))
+
+
+@app.command()
+def check(
+    family: Annotated[list[str] | None, typer.Option(help="Families; default: with a law.")] = None,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first group.")] = 1000,
+    groups: Annotated[int, typer.Option(min=1, help="Groups of each family.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("out/atlas_check"),
+) -> None:
+    """Run designs that no law was fitted to; print how many bays lie in the intervals."""
+    with user_errors():
+        known = [name for recipe in RECIPES.values() for name in recipe.families]
+        names = family or known
+        for name in names:
+            if name not in known:
+                raise UnknownNameError("family", name, known)
+        asked = [(name, first + number) for name in names for number in range(groups)]
+        with progress_bar("blasts") as progress:
+            for done, (name, number) in enumerate(asked):
+                run_group(name, number, False, out)
+                progress((done + 1) / len(asked))
+        scenes = [*scenes_with_loads(groups_in(out))]
+        rows = findings.inside_rows(scenes, packaged_laws(), names)
+        headers = ("family", "blasts", "bays in range", "impulse, error of ln", "peak, error of ln")
+        more = ("impulses inside", "peaks inside", "impulses too low", "peaks too low")
+        print_line(markdown_table((*headers, *more), rows))
 
 
 @app.command()

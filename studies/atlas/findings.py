@@ -1,19 +1,20 @@
 """Tables of the atlas: what the blasts show, what the laws say, and how far off they are."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas import Law, Laws
 from blast_env.atlas.between import numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.laws import TOLERATED
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES
-from studies.atlas.samples import Bays, row_between, scenes_with_loads
+from studies.atlas.samples import Bays, row_between, samples, scenes_with_loads
 from studies.atlas.sites import SiteLoads
 
 Row = tuple[str, ...]
@@ -83,6 +84,38 @@ def error_rows(known: Laws) -> Iterator[Row]:
                 ),
                 *(f"{100.0 * share:.0f} %" for share in family.inside),
             )
+
+
+def inside_rows(scenes: Sequence[Bays], known: Laws, families: Collection[str]) -> Iterator[Row]:
+    """Yield one row per family: error of ln(factor), and the bays in the intervals."""
+    totals = []
+    for name, recipe in RECIPES.items():
+        law: Law = getattr(known, name)
+        for family in (own for own in recipe.families if own in families):
+            own = samples((bays for bays in scenes if bays.family == family), recipe.numbers_of)
+            found, ratio = law.factors(own.numbers), np.exp(own.log_change)
+            inside = (found.low <= ratio) & (ratio <= found.high)
+            over = ratio / found.counted > TOLERATED
+            kept = found.in_range
+            off = (own.log_change - np.log(found.middle))[kept]
+            blasts = len(np.unique(own.scene))
+            totals.append((blasts, off, inside[kept], over[kept]))
+            yield (FAMILIES[family].title, *_inside_cells(blasts, off, inside[kept], over[kept]))
+    blasts = sum(count for count, *_ in totals)
+    errors = np.concatenate([errors for _, errors, _, _ in totals])
+    held = np.concatenate([held for _, _, held, _ in totals])
+    low = np.concatenate([low for _, _, _, low in totals])
+    yield ("all", *_inside_cells(blasts, errors, held, low))
+
+
+def _inside_cells(blasts: int, off: FloatArray, inside: BoolArray, over: BoolArray) -> Row:
+    return (
+        str(blasts),
+        str(len(off)),
+        *(f"{value:.2f}" for value in np.sqrt((off**2).mean(axis=0))),
+        *(f"{100.0 * share:.0f} %" for share in inside.mean(axis=0)),
+        *(f"{100.0 * share:.0f} %" for share in over.mean(axis=0)),
+    )
 
 
 def cell_rows(

@@ -4,11 +4,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from blast_env.atlas import packaged_laws
+from blast_env.parquet import read_frame
 from blast_env.units import MODULE_SIDE_M
+from studies.atlas.__main__ import app
 from studies.atlas.families import FAMILIES
-from studies.atlas.runs import groups_in, rounds, run_group
+from studies.atlas.findings import inside_rows
+from studies.atlas.runs import COLUMNS, groups_in, groups_of, rounds, run_group
+from studies.atlas.samples import scenes_with_loads
 from studies.atlas.scenes import CUBE_ROOT, Box, Scene, scaled_impulse
+
+DATA = Path(__file__).parents[2] / "docs" / "data" / "atlas_blasts.parquet"
+FITTED = ("opposite", "shadow")
 
 
 def test_loads_follow_hopkinson_and_cranz() -> None:
@@ -59,3 +68,24 @@ def test_families_take_turns() -> None:
         ("posts", 1, False),
     ]
     assert [own for own in asked if own[2]] == [("wall", 0, True), ("posts", 1, True)]
+
+
+def test_the_packaged_laws_hold_the_published_blasts() -> None:
+    """The table has every scene whole, and most of its bays lie in the intervals."""
+    table = read_frame(DATA, COLUMNS)
+    chosen = table[table["family"].isin(FITTED)]
+    scenes = [*scenes_with_loads(groups_of(chosen, MODULE_SIDE_M))]
+    assert len(scenes) > 200
+    rows = {title: row for title, *row in inside_rows(scenes, packaged_laws(), FITTED)}
+    assert int(rows["all"][0]) == len(scenes)
+    for title in ("a front behind the charge", "the walls of a block out of sight"):
+        shares = [float(share.split()[0]) for share in rows[title][4:6]]
+        assert min(shares) > 85.0
+
+
+def test_new_designs_are_run_and_judged(tmp_path: Path) -> None:
+    done = CliRunner().invoke(
+        app, ["check", "--family", "shadow", "--first", "3", "--out", str(tmp_path)]
+    )
+    assert done.exit_code == 0, done.output
+    assert "the walls of a block out of sight | 1 |" in done.output
