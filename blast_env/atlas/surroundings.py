@@ -25,7 +25,6 @@ BARRIER: Final = "barrier"
 """In the place of the structure's name, for pieces of a layout."""
 
 _PLACE: Final = re.compile(r"_x[-\d.]+_y[-\d.]+$")  # in the names of pieces
-_TALL_M: Final = 100.0  # of a structure without a height
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ class Solid:
         for outline in site.structures:
             for block in outline.blocks:
                 left, bottom, right, top = block.rectangle_m
-                high_m = _TALL_M if block.height_m is None else block.height_m
+                high_m = site.air_height_m if block.height_m is None else block.height_m
                 rows.append((left, bottom, right, top, block.base_m or 0.0, high_m))
                 names.append(f"{_PLACE.sub('', block.name) or outline.name} {high_m:g} m")
                 structures.append(BARRIER if outline.is_barrier else outline.name)
