@@ -23,7 +23,10 @@ _SMALL: Final = 0.02
 """Gate below which an obstacle does nothing, in range or not."""
 
 TOLERATED: Final = 1.15
-"""What a load may be above the one that counts, see `Factors.counted`."""
+"""What a load may be above the one that counts."""
+
+_UPPER_ENDS: Final = (TOLERATED, 1.0)
+"""What the upper ends of impulse and peak may be above what counts: peaks scatter more."""
 
 _BEYOND: Final = 1e-6
 
@@ -53,9 +56,10 @@ class Factors(NamedTuple):
     def counted(self) -> FloatArray:
         """Factors for the load (bays, 2).
 
-        Of designs left out of the fit, one bay in twenty has over 1.15 times as much.
+        Of designs left out of the fit, one bay in twenty has over 1.15 times the impulse, and one
+        in twenty a larger peak.
         """
-        return np.maximum(self.middle, self.high / TOLERATED)
+        return np.maximum(self.middle, self.high / np.array(_UPPER_ENDS))
 
     def times(self, other: "Factors") -> "Factors":
         """Return the products of both."""

@@ -85,6 +85,7 @@ def test_intervals_hold_the_estimate_and_the_counted_load_is_on_the_safe_side() 
     assert (found.low < found.middle).all()
     assert (found.middle < found.high).all()
     assert (found.counted >= found.middle).all()
+    assert (found.counted[:, 1] == found.high[:, 1]).all()
 
 
 def test_outside_its_range_the_law_takes_nothing_off() -> None:
