@@ -6,23 +6,26 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Final
 
 import numpy as np
 import torch
 import typer
+from matplotlib.figure import Figure
 
-from blast_env.answers.terminal import print_line, print_table
+from blast_env.answers.terminal import print_line
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import Transition
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.evaluator import Assessment
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
+from blast_env.plots.figures import save_figure
 from blast_env.site import Catalogue, Scenario
 from blast_env.statistics import Estimate, mean_estimate
 from blast_env.units import PA_PER_PSI
-from studies.first_hour import HELD_OUT, Setting, reductions, trained
+from studies.first_hour import HELD_OUT, Curve, Setting, reductions, trained
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,29 @@ def _shape(catalogue: Catalogue) -> tuple[int, int, int]:
     return len(catalogue.variants), *catalogue.shape
 
 
+def picture(curves: Mapping[str, Curve], random: float) -> Figure:
+    """Return a figure of the reductions in training over its steps, means of 100 episodes.
+
+    Args:
+        curves: What each training met, by its name.
+        random: The mean reduction by random legal actions.
+    """
+    figure = Figure(figsize=(7.5, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for name, curve in curves.items():
+        kernel = np.full(min(_EPISODES, len(curve.steps)), 1.0) / min(_EPISODES, len(curve.steps))
+        means = np.convolve(100.0 * np.array(curve.reductions), kernel, mode="valid")
+        axes.plot(curve.steps[len(kernel) - 1 :], means, label=name)
+    axes.axhline(100.0 * random, color="0.5", linestyle="--", label="random legal actions")
+    axes.set_xlabel("steps of the training")
+    axes.set_ylabel("load taken off (%)")
+    axes.legend(fontsize="small")
+    return figure
+
+
+_EPISODES: Final = 100
+
+
 def main(
     steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 10_240,
     scenario: Annotated[str, typer.Option(help="The site.")] = "control_room",
@@ -122,21 +148,27 @@ def main(
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 1,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = 24,
     repeats: Annotated[int, typer.Option(help="Threats of repeated actions.")] = 2,
+    out: Annotated[Path | None, typer.Option(help="Picture of the trainings.")] = None,
 ) -> None:
     """Train PPO with and without each cause; print reductions on held-out threats."""
     torch.set_num_threads(1)
     judge, judged = find_engine(engine), HELD_OUT[:threats]
     flat = Setting(scenario, engine, action="place").environment(judge)
-    print_line(f"random: {100.0 * reductions(flat, None, judged).mean():.1f} %")
+    random = reductions(flat, None, judged).mean()
+    print_line(f"random: {100.0 * random:.1f} %")
     for name, estimate in repeated(flat, HELD_OUT[:repeats]).items():
         print_line(f"single actions repeated, as {name}: {100.0 * estimate.value:.1f} %")
-    rows = []
+    curves = {}
     for name, setting in settings(scenario, engine).items():
-        agents = [trained("PPO", setting, steps, seed) for seed in range(seeds)]
+        curve = curves[name] = Curve()
+        agents = [
+            trained("PPO", setting, steps, seed, None if seed else curve) for seed in range(seeds)
+        ]
         env = setting.environment(judge)
         means = [100.0 * reductions(env, agent, judged).mean() for agent in agents]
-        rows.append((name, ", ".join(f"{mean:.1f}" for mean in means)))
-    print_table(f"{scenario}, {steps:,} steps", ("cause taken away", "reduction, %"), rows)
+        print_line(f"{name}: {', '.join(f'{mean:.1f}' for mean in means)} %")
+    if out is not None:
+        save_figure(picture(curves, float(random)), out)
 
 
 if __name__ == "__main__":

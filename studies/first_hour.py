@@ -16,6 +16,7 @@ import typer
 from blast_agents.training.environments import ThreatPool
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 
 from blast_env.answers.terminal import print_line, print_table
 from blast_env.arrays import FloatArray
@@ -73,13 +74,36 @@ class Setting:
         return find_engine(self.engine)
 
 
-def trained(algorithm: str, setting: Setting, steps: int, seed: int) -> Agent:
+class Curve(BaseCallback):
+    """Keeps the reductions of a training's episodes.
+
+    Attributes:
+        steps: Steps of the training at the end of each episode (episodes,).
+        reductions: The reduction in each (episodes,).
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.steps: list[int] = []
+        self.reductions: list[float] = []
+
+    def _on_step(self) -> bool:
+        for ended, info in zip(self.locals["dones"], self.locals["infos"], strict=True):
+            if ended:
+                self.steps.append(self.num_timesteps)
+                self.reductions.append(info["reduction"])
+        return True
+
+
+def trained(
+    algorithm: str, setting: Setting, steps: int, seed: int, curve: Curve | None = None
+) -> Agent:
     """Return an agent of the library's defaults; a noisy engine has 128 threats, met again."""
     env: gym.Env[Any, Any] = setting.environment(setting.training, realisations=1)
     if setting.training.has_noise:
         env = ThreatPool(env, 128, seed)
     agent: Agent = KNOWN[algorithm]("MlpPolicy", env, seed=seed, device="cpu")
-    agent.learn(steps)
+    agent.learn(steps, callback=curve)
     return agent
 
 

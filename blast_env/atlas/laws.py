@@ -59,7 +59,8 @@ class Factors(NamedTuple):
         Of designs left out of the fit, one bay in twenty has over 1.15 times the impulse, and one
         in twenty a larger peak.
         """
-        return np.maximum(self.middle, self.high / np.array(_UPPER_ENDS))
+        counted: FloatArray = np.maximum(self.middle, self.high / np.array(_UPPER_ENDS))
+        return counted
 
     def times(self, other: "Factors") -> "Factors":
         """Return the products of both."""

@@ -136,8 +136,11 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.first_hour --reward relative --action row": (
         "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0"
     ),
-    "python -m studies.first_hour --scenario control_room --engine surrogate --action dimensions"
-    " --seeds 1 --threats 24 --by-gas 6": "--steps 64 --algorithm PPO --threats 2 --by-gas 0",
+    "python -m studies.first_hour --engine surrogate --algorithm PPO --seeds 1 --threats 24"
+    " --by-gas 6 --scenario courtyard --scenario control_room --scenario visitor_entrance": (
+        "--steps 64 --threats 2 --by-gas 0"
+    ),
+    "python -m studies.causes --out docs/pictures/causes.png": "--steps 64 --threats 2 --repeats 1",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.gas kingery-bulmash --charges 100": "--charges 20 --distances 4.3",

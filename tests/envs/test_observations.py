@@ -1,5 +1,7 @@
 """Observations of the barrier environment: planes, vectors, and both with the mask."""
 
+import math
+import re
 from itertools import pairwise
 from typing import Any
 
@@ -233,6 +235,35 @@ def test_each_value_of_the_vector_has_a_name(name: str) -> None:
     assert not any(name.startswith(("structure", "charge", "build zone")) for name in changed)
     if scenario.zone.items:
         assert f"{variants[variant].name}: pieces left / at first" in changed
+
+
+def count_of(text: str, sizes: dict[str, int]) -> int:
+    """Return what a cell of a table says, such as `59 + 2 cells` or `variants x cells`."""
+    return sum(
+        math.prod(sizes[word] if word in sizes else int(word) for word in re.findall(r"\w+", term))
+        for term in text.replace(" x ", " ").split("+")
+    )
+
+
+@pytest.mark.parametrize("name", ["courtyard", "hotel_forecourt", "control_room"])
+def test_the_tables_of_the_page_add_up_to_the_space(name: str) -> None:
+    """Place and length of all parts of the vector, as the page on environments repeats them."""
+    scenario = load_scenario(name)
+    catalogue, cells = scenario.zone.catalogue, math.prod(scenario.zone.shape)
+    sizes = {"cells": cells, "items": len(catalogue.names), "variants": len(catalogue.variants)}
+    rows = [
+        [cell.strip() for cell in line.strip().strip("|").split("|")]
+        for line in (FeaturesObservation.__doc__ or "").splitlines()
+        if line.strip().startswith("|") and "length" not in line and "---" not in line
+    ]
+    always, with_items = ([row for row in rows if len(row) == columns] for columns in (3, 2))
+    place = 0
+    for first, length, _ in always:
+        assert count_of(first, sizes) == place
+        place += count_of(length, sizes)
+    if catalogue.has_items:
+        place += sum(count_of(length, sizes) for length, _ in with_items)
+    assert FeaturesObservation().space(scenario).shape == (place + bool(scenario.vehicles),)
 
 
 def test_too_many_structures_are_named() -> None:
