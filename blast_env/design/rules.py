@@ -262,9 +262,9 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
         BlastEnvError: If the scenario has no build zone.
     """
     found = find_scenario(scenario)
-    if charge is not None:
-        found = found.model_copy(update={"charge": (source_of(charge),)})
-    return visibility_layout(found, Visibility.of(found))
+    # The lines are those of the known charge; the legal places keep off all possible ones.
+    seen = found if charge is None else found.model_copy(update={"charge": (source_of(charge),)})
+    return visibility_layout(found, Visibility.of(seen))
 
 
 def hardening_alone(scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:  # noqa: ARG001

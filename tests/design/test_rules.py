@@ -21,10 +21,13 @@ from blast_env.design import (
     wall_near_charge,
     why_no_wall,
 )
+from blast_env.design.search import layouts_by_rule
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import draw_threats
 from blast_env.geometry import Layout, Piece
-from blast_env.layout import LayoutState, worst_places
+from blast_env.layout import LayoutState, check_layout, worst_places
 from blast_env.site import Charge, PointSource, RectangleSource, Scenario, load_scenario
+from blast_env.sites import close_ranges, generate_site
 from tests.agents.sites import site
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
 
@@ -378,3 +381,11 @@ def test_the_wall_is_added_to_the_posts_and_keeps_the_stand_off() -> None:
 def test_without_a_vehicle_there_is_no_line_of_posts() -> None:
     with pytest.raises(BlastEnvError, match="courtyard has no vehicle"):
         line_of_posts(load_scenario("courtyard"))
+
+
+def test_pieces_keep_off_all_places_where_a_known_charge_may_be() -> None:
+    """The lines are those of the charge, but a place near another possible one is not legal."""
+    scenario = generate_site(10_009, close_ranges(20.0))
+    (threat,) = draw_threats(scenario, [0])
+    for layout in layouts_by_rule(scenario, threat.charge).values():
+        assert check_layout(scenario, layout) == layout
