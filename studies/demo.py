@@ -15,6 +15,7 @@ from typing import Annotated, Final
 import numpy as np
 import torch
 import typer
+from blast_agents import packaged_agent
 from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 
@@ -63,6 +64,8 @@ HEADERS: Final = (
 NOTHING: Final = "no barrier"
 RANDOM: Final = "random layout"
 AGENT: Final = "MaskablePPO"
+PACKAGED: Final = "packaged agent"
+"""The agent that comes with the package, which was not trained on the site."""
 
 
 @dataclass(frozen=True)
@@ -357,6 +360,7 @@ def compare_methods(settings: DemoSettings, training: DemoTraining) -> AgentComp
         NOTHING: [()] * len(cases),
         RANDOM: [random_layout(case.scenario, generator(case.seed)) for case in cases],
         **{name: [rule[name] for rule in rules] for name in rules[0]},
+        PACKAGED: [packaged_agent().ranked(case.scenario)[0] for case in cases],
         AGENT: [training.best] * len(cases),
     }
     evaluators, results = Evaluators(JUDGE, most=len(cases)), {}

@@ -86,8 +86,12 @@ if TYPE_CHECKING:
 
 ThreatName = Literal["visible", "hidden"]
 
-_METHOD_HELP: Final = f"{', '.join(proposers())}. package runs no blast."
 PACKAGE: Final = PackageProposer().name
+AGENT: Final = "agent"
+"""The packaged agent, which this package knows by the command line alone."""
+
+_WITHOUT_BLASTS: Final = (PACKAGE, AGENT)
+_METHOD_HELP: Final = f"{', '.join((*proposers(), AGENT))}. package and agent run no blast."
 _SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
@@ -142,7 +146,8 @@ def search(
     verify: bool = typer.Option(
         False,
         "--verify",
-        help="With --method package: compare it by gas dynamics with no barrier and the rules.",
+        help="With --method package or agent: compare the proposal by gas dynamics with no barrier "
+        "and the rules.",
     ),
     out: Path | None = writes("Folder for layout, its plan, history, front and figure"),
     charge: ChargeOption = None,
@@ -164,18 +169,23 @@ def search(
     outside the search; those blasts do not count.
 
     --method package proposes a layout in seconds without a blast, by the surrogate of gas dynamics;
-    nothing is proposed if the expected reduction is below 3 %. Without --charge, that layout is for
-    all possible places of the charge.
+    nothing is proposed if the expected reduction is below 3 %. --method agent does so by a policy
+    that was trained on other sites. Without --charge, such a layout is for all possible places of
+    the charge.
     """
     given = ChargeInput.of(charge, tnt_kg)
-    if method == PACKAGE:
-        refuse_given(context, _WITH_BLASTS, f"does not apply to --method {PACKAGE}")
-        found = _package_proposal(load_scenario(scenario), given, cells, processes, out)
+    if method in _WITHOUT_BLASTS:
+        refuse_given(context, _WITH_BLASTS, f"does not apply to --method {method}")
+        found = _proposal_without_blasts(
+            method, load_scenario(scenario), given, cells, processes, out
+        )
         if verify:
             _verify(*found, cells)
         return
     if verify:
-        raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
+        raise BlastEnvError(
+            f"--verify is for --method {' or '.join(_WITHOUT_BLASTS)}, not {method}"
+        )
     refuse_given(context, *_OF_OTHER_THREAT[threat])
     with running_on(cluster) as threads_now, resumable(resume_words(cache)):
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
@@ -351,32 +361,47 @@ def _provenance(
     }
 
 
-def _package_proposal(
-    scenario: Scenario, given: ChargeInput, cells: str | None, processes: int, out: Path | None
+def _proposal_without_blasts(
+    method: str,
+    scenario: Scenario,
+    given: ChargeInput,
+    cells: str | None,
+    processes: int,
+    out: Path | None,
 ) -> tuple[DesignProblem, Layout]:
     """Propose a layout without a blast, print it, and write it; return it with its problem."""
     scenario.zone  # noqa: B018  # refuses a scenario without one
     engine = find_engine(JUDGE, cells=cells)
     problem = problem_of(scenario, _given_charge(scenario, given), processes, engine)
+    proposer, digests = _without_blasts(method)
     began_s = perf_counter()
     with progress_bar(f"proposal for {scenario.name}") as progress:
 
         def report(state: Progress) -> None:
             progress(state.share)
 
-        result = PackageProposer().propose(problem, report=report)
+        result = proposer.propose(problem, 0, report=report)
     ms = MS_PER_S * (perf_counter() - began_s)
     print_line(
         f"{scenario.name}: {proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
     )
     if out is not None:
         make_folder(out)
-        from blast_env.surrogate import packaged_surrogate  # takes half a second to import
-
-        digest = packaged_surrogate().digest
-        provenance = {"surrogate": digest, "command": command(), "versions": versions()}
+        provenance = {**digests, "command": command(), "versions": versions()}
         print_written(_write_layout(scenario, result.layout, provenance, out))
     return problem, result.layout
+
+
+def _without_blasts(method: str) -> tuple[Proposer, dict[str, str]]:
+    """Return a method that runs no blast, and the digests of what it goes by."""
+    from blast_env.surrogate import packaged_surrogate  # takes half a second to import
+
+    digests = {"surrogate": packaged_surrogate().digest}
+    if method == PACKAGE:
+        return PackageProposer(), digests
+    from blast_agents.packaged import AgentProposer, packaged_agent
+
+    return AgentProposer(), digests | {"agent": packaged_agent().digest}
 
 
 def _given_charge(scenario: Scenario, given: ChargeInput) -> AnyCharge | None:

@@ -18,6 +18,7 @@ from blast_env.surrogate import site_of
 from studies.demo import (
     AGENT,
     NOTHING,
+    PACKAGED,
     RANDOM,
     AgentComparison,
     DemoSettings,
@@ -56,7 +57,7 @@ def test_it_trains_compares_and_films(tmp_path: Path) -> None:
     assert sum(line.startswith("  after") for line in printed.splitlines()) == 2
     names = list(comparison.results)
     by_rule = [row.title for row in proposers(ProposerKind.RULE, suiting=[SITE]).values()]
-    assert names == ["no barrier", "random layout", *by_rule, AGENT]
+    assert names == ["no barrier", "random layout", *by_rule, PACKAGED, AGENT]
     assert all(name in printed for name in (*names, "best rule for each case"))
     files = ["learning_curve.png", "side_by_side.mp4", "facade.png", "site.png", "loads.xlsx"]
     together = (suffix for suffix in SUFFIXES if suffix != ".ifc")  # its extra is large

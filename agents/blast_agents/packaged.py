@@ -1,0 +1,356 @@
+"""The packaged agent: one policy that places pieces on any site, without a blast.
+
+It was trained on generated sites, and looks at candidate places by their relations to charge,
+walls and pieces (`policies.candidates`). `python -m studies.packaged_agent` trains and judges it.
+It does without torch.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
+from blast_env.arrays import FloatArray, IntArray
+from blast_env.design.search.learnt import Guesses, case_for
+from blast_env.design.search.package import LEAST_GAIN
+from blast_env.design.search.problem import Progress, Report, SearchResult
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import DesignProblem
+from blast_env.files import read_regular, write_atomically
+from blast_env.geometry import Layout
+from blast_env.layout.batch import LayoutBatch, PlacementRules
+from blast_env.site import AnyCharge, AnyScenario, find_scenario
+from blast_env.statistics import reductions
+from blast_env.surrogate import packaged_surrogate
+from blast_env.values import generator, whole_number
+
+Weights = Mapping[str, NDArray[np.float32]]
+"""Arrays by name."""
+
+WEIGHTS: Final = "packaged_agent.safetensors"
+"""Name of the file of the weights, in this package."""
+
+DRAWS: Final = 64
+"""Layouts that the agent draws where guesses choose among them."""
+
+MOST_DRAWS: Final = 10_000
+"""Largest number of layouts of one call."""
+
+_MOST_BYTES: Final = 5_000_000
+_HEADER: Final = 8
+"""Bytes before the header of a file of safetensors: its length, least byte first."""
+
+
+def write_weights(weights: Weights, about: Mapping[str, str], path: Path) -> None:
+    """Write weights as a file of safetensors, whole or not at all.
+
+    The format is a length, a JSON header with the place of each array, and the arrays
+    (github.com/huggingface/safetensors). So it needs no package, and can run no code when read.
+
+    Args:
+        weights: The arrays, which are written in single precision.
+        about: Text that goes with them.
+        path: The file.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    header: dict[str, Any] = {"__metadata__": dict(about)}
+    parts, end = [], 0
+    for name, values in sorted(weights.items()):
+        part = np.ascontiguousarray(values, dtype="<f4")
+        begin, end = end, end + part.nbytes
+        header[name] = {"dtype": "F32", "shape": list(part.shape), "data_offsets": [begin, end]}
+        parts.append(part.tobytes())
+    text = json.dumps(header, sort_keys=True).encode()
+    text += b" " * (-len(text) % _HEADER)  # the arrays begin at a multiple of 8 bytes
+    with write_atomically(path) as temporary:
+        temporary.write_bytes(len(text).to_bytes(_HEADER, "little") + text + b"".join(parts))
+
+
+def read_weights(content: bytes, place: str) -> Weights:
+    """Return the arrays of a file of safetensors.
+
+    Args:
+        content: The bytes of the file.
+        place: Name of the file, for the error.
+
+    Raises:
+        BlastEnvError: If it is damaged, or has arrays that are not finite or of another type.
+    """
+    try:
+        start = _HEADER + int.from_bytes(content[:_HEADER], "little")
+        header = json.loads(content[_HEADER:start])
+        header.pop("__metadata__", None)
+        found = {}
+        for name, entry in header.items():
+            if entry["dtype"] != "F32":
+                raise ValueError(f"{name} has the type {entry['dtype']}, must be F32")
+            begin, end = (start + offset for offset in entry["data_offsets"])
+            values = np.frombuffer(content[begin:end], dtype="<f4").reshape(entry["shape"])
+            if not np.isfinite(values).all():
+                raise ValueError(f"{name} has values that are not finite")
+            found[name] = values.astype(np.float32)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BlastEnvError(f"{place}: is damaged, or no file of safetensors: {error}") from error
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateNetwork:
+    """Scores of candidates and of finishing, by two small networks without a size of the site.
+
+    Attributes:
+        weights: Its arrays by name; `shapes` has their shapes.
+    """
+
+    weights: Weights
+
+    @staticmethod
+    def shapes(width: int) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each array, for a width of the hidden layers."""
+        return {
+            "static": (len(STATIC), width),
+            "changing": (len(CHANGING), width),
+            "whole": (len(WHOLE), width),
+            "first_bias": (width,),
+            "second": (width, width),
+            "second_bias": (width,),
+            "score": (width,),
+            "finish_first": (len(WHOLE), width),
+            "finish_first_bias": (width,),
+            "finish": (width,),
+            "finish_bias": (1,),
+        }
+
+    @classmethod
+    def of(cls, weights: Weights, place: str) -> "CandidateNetwork":
+        """Return a network of arrays from a file.
+
+        Raises:
+            BlastEnvError: If arrays are missing or have other shapes.
+        """
+        width = len(weights.get("score", ()))
+        shapes = {name: values.shape for name, values in weights.items()}
+        if shapes != cls.shapes(width):
+            raise BlastEnvError(
+                f"{place}: has arrays of the shapes {shapes}, must have {cls.shapes(width)}"
+            )
+        return cls(weights)
+
+    def prepared(self, static: FloatArray) -> FloatArray:
+        """Return the part of the first layer that does not change (candidates, width)."""
+        found: FloatArray = static @ self.weights["static"] + self.weights["first_bias"]
+        return found
+
+    def scores(self, prepared: FloatArray, changing: FloatArray, whole: FloatArray) -> FloatArray:
+        """Return the score of each candidate and, last, of finishing (candidates + 1,)."""
+        own = self.weights
+        first = prepared + changing @ own["changing"] + whole @ own["whole"]
+        np.maximum(first, 0.0, out=first)
+        second = first @ own["second"] + own["second_bias"]
+        np.maximum(second, 0.0, out=second)
+        finish = np.maximum(whole @ own["finish_first"] + own["finish_first_bias"], 0.0)
+        return np.append(second @ own["score"], finish @ own["finish"] + own["finish_bias"])
+
+
+@dataclass(frozen=True, eq=False)
+class PackagedAgent:
+    """Places pieces one after the other by the scores of candidates; a `SamplingAgent`.
+
+    It serves every site with a build zone and a protected structure, with modules or a catalogue,
+    against a known charge, a hidden one or a vehicle. Layouts keep all conditions of the zone.
+
+    Attributes:
+        network: The network.
+    """
+
+    network: CandidateNetwork = field(repr=False)
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits of a hash of the weights."""
+        digest = sha256()
+        for name, values in sorted(self.network.weights.items()):
+            digest.update(name.encode() + values.tobytes())
+        return digest.hexdigest()[:16]
+
+    def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
+        """Return the layout of the candidates with the highest scores; it is deterministic.
+
+        Args:
+            scenario: The scenario, or its bundled name or path; it has a build zone.
+            charge: The charge, if it is known; otherwise the layout is for some of the possible
+                ones. A vehicle is taken to be at its worst place behind the rule's line of posts.
+
+        Raises:
+            BlastEnvError: If the scenario has no build zone, or no structure is protected.
+        """
+        return self._layouts(scenario, charge, 1, None)[0]
+
+    def sample(
+        self,
+        scenario: AnyScenario,
+        charge: AnyCharge | None = None,
+        count: int = 8,
+        seed: int = 0,
+    ) -> tuple[Layout, ...]:
+        """Return layouts of candidates that are drawn by the softmax of their scores.
+
+        Args:
+            scenario: As for `propose`.
+            charge: As for `propose`.
+            count: Number of layouts; some may be equal.
+            seed: Seed of the draws.
+
+        Raises:
+            BlastEnvError: As for `propose`, or if `count` is not a whole number from 1 to 10,000.
+        """
+        checked = whole_number("count", count, 1, MOST_DRAWS)
+        return self._layouts(scenario, charge, checked, generator(seed))
+
+    def ranked(
+        self,
+        scenario: AnyScenario,
+        charge: AnyCharge | None = None,
+        count: int = DRAWS,
+        seed: int = 0,
+    ) -> tuple[Layout, ...]:
+        """Return proposal and samples, sorted each, without repeats; the best guess comes first.
+
+        Args:
+            scenario: As for `propose`.
+            charge: As for `propose`.
+            count: Number of samples.
+            seed: Seed of the samples.
+
+        Raises:
+            BlastEnvError: As for `sample`.
+        """
+        found = find_scenario(scenario)
+        guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
+        drawn = (self.propose(found, charge), *self.sample(found, charge, count, seed))
+        guesses.loads([tuple(sorted(layout)) for layout in drawn])
+        return tuple(guesses.ranked())
+
+    def _layouts(
+        self,
+        scenario: AnyScenario,
+        charge: AnyCharge | None,
+        count: int,
+        rng: np.random.Generator | None,
+    ) -> tuple[Layout, ...]:
+        """Return layouts, drawn or, without a generator, of the highest scores."""
+        candidates = Candidates.of(find_scenario(scenario), charge)
+        prepared = self.network.prepared(candidates.static)
+        rules = PlacementRules.of(candidates.empty)
+        batch = LayoutBatch(candidates.empty, rules, count)
+        batch.begin(range(count), rules, candidates.empty)
+        standing: dict[frozenset[int], Standing] = {frozenset(): Standing(candidates)}
+        placed: list[frozenset[int]] = [frozenset()] * count
+        open_ones = np.flatnonzero(~batch.is_full).tolist()
+        while open_ones:
+            # Many layouts have the same pieces: the network looks at them once.
+            sharing: dict[frozenset[int], list[int]] = {}
+            for index in open_ones:
+                sharing.setdefault(placed[index], []).append(index)
+            grown, chosen = {}, []
+            for pieces, indices in sharing.items():
+                state = standing[pieces]
+                legal = np.flatnonzero(batch.legal[indices[0]].ravel()[candidates.numbers])
+                changing = state.features(legal)
+                whole = state.whole(legal, changing, int(batch.left[indices[0], 0]))
+                scores = self.network.scores(prepared[legal], changing, whole)
+                for index, choice in zip(indices, _choices(scores, len(indices), rng), strict=True):
+                    if choice == len(legal):
+                        continue
+                    candidate = int(legal[choice])
+                    placed[index] = pieces | {candidate}
+                    chosen.append((index, candidate))
+                    if placed[index] not in grown:
+                        grown[placed[index]] = state.copy()
+                        grown[placed[index]].add(candidate)
+            standing = grown
+            going_on = [index for index, _ in chosen]
+            batch.place(going_on, [int(candidates.numbers[own]) for _, own in chosen])
+            open_ones = [index for index in going_on if not batch.is_full[index]]
+        return tuple(batch.elements(index) for index in range(count))
+
+
+def _choices(scores: FloatArray, count: int, rng: np.random.Generator | None) -> Sequence[int]:
+    """Return the place of the highest score or, with a generator, `count` draws by the softmax."""
+    if rng is None:
+        return [int(scores.argmax())] * count
+    up_to = np.cumsum(np.exp(scores.astype(np.float64) - float(scores.max())))
+    drawn: IntArray = np.searchsorted(up_to, rng.random(count) * up_to[-1], side="right")
+    choices: list[int] = np.minimum(drawn, len(scores) - 1).tolist()
+    return choices
+
+
+def load_packaged(path: Path) -> PackagedAgent:
+    """Return the agent of a file of weights.
+
+    Raises:
+        BlastEnvError: If it does not exist, is too large or damaged, or has other arrays.
+    """
+    content = read_regular(path, _MOST_BYTES)
+    return PackagedAgent(CandidateNetwork.of(read_weights(content, str(path)), str(path)))
+
+
+@cache
+def packaged_agent() -> PackagedAgent:
+    """Return the agent that comes with the package."""
+    content = files(__package__).joinpath(WEIGHTS).read_bytes()
+    return PackagedAgent(CandidateNetwork.of(read_weights(content, WEIGHTS), WEIGHTS))
+
+
+@dataclass(frozen=True)
+class AgentProposer:
+    """Proposes the best guess among the packaged agent's layout and draws, without a blast.
+
+    Attributes:
+        draws: Number of draws.
+        name: Name in tables.
+    """
+
+    draws: int = DRAWS
+    name: str = "agent"
+
+    def propose(
+        self,
+        problem: DesignProblem,
+        budget: int = 0,
+        seed: int = 0,
+        report: Report | None = None,
+    ) -> SearchResult:
+        """Return the layout and its expected gain; empty below `LEAST_GAIN`.
+
+        Args:
+            problem: The problem.
+            budget: Most blasts, none of which is spent.
+            seed: Seed of the draws.
+            report: Called with the progress.
+
+        Raises:
+            BlastEnvError: If the site has no build zone, or no structure is protected.
+        """
+        scenario, charge = problem.scenario, problem.known_charge
+        surrogate, agent = packaged_surrogate(), packaged_agent()
+        layout = agent.ranked(scenario, charge, self.draws, seed)[0]
+        guesses = Guesses.of(surrogate, case_for(scenario, charge))
+        gain = reductions(*guesses.loads([layout, ()])).item()
+        by = f"the packaged agent, the best guess of {self.draws} draws"
+        if not gain >= LEAST_GAIN:  # NaN: nothing arrives
+            by = f"{by}: an expected reduction of {100.0 * gain:.1f} % at best"
+            layout, gain = (), 0.0
+        if report is not None:
+            report(Progress(0, 0, guessed=1.0))
+        return SearchResult(layout, self.name, by, gain, budget=budget, seed=seed)

@@ -1,0 +1,462 @@
+"""Features of candidate places: what the packaged agent sees of a site of any size.
+
+A candidate is a variant of the catalogue (an item in one direction, or a measure) with its lower
+left cell. Its features are relations to the charge, to the protected walls and to the pieces that
+stand, in the frame of the line from the charge to the walls. So a turned or mirrored site has the
+same features, and their number does not depend on the site.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.design.bollards import line_of_posts, posts_and_wall
+from blast_env.design.search.learnt import case_for
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.layout import LayoutState
+from blast_env.layout.build_site import vehicle_reach
+from blast_env.site import AnyCharge, Scenario
+from blast_env.site.blast_site import Charge
+from blast_env.surrogate.walls import WallPoints
+from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.reach import squares_of
+
+BEARINGS: Final = 32
+"""Bearings from a charge on which the protected walls are counted."""
+
+_LENGTH_M: Final = 10.0
+"""Unit of lengths, so that features are of the order of 1."""
+
+_MOST: Final = 4.0
+"""Bound on the magnitude of features."""
+
+_LEAST_M: Final = 0.25
+_LEAST_SCALED: Final = 0.05
+"""Offset of scaled distances before their logarithm, m/kg^(1/3)."""
+
+STATIC: Final = (
+    *("along", "remaining", "along_share", "aside", "offset", "cut", "hidden_cut", "hidden_height"),
+    *("detour_over", "before", "log_from_charge", "log_from_walls", "half_along", "half_aside"),
+    *("along_spread", "aside_spread", "most_hidden_cut", "height", "scaled_height", "length"),
+    *("thickness", "is_single", "stops_vehicles", "is_measure", "is_module", "cost_share"),
+    *("height_rank", "cut_for_cost", "in_reach", "has_vehicle", "of_posts", "of_posts_and_wall"),
+)
+"""Features of a candidate that do not depend on the pieces that stand."""
+
+CHANGING: Final = (
+    *("open_cut", "covered", "is_first", "gap", "touches", "along_from_nearest"),
+    *("aside_from_nearest", "same_item", "same_variant", "cost_of_rest"),
+)
+"""Features of a candidate among the pieces that stand."""
+
+WHOLE: Final = (
+    *("distance", "half_angle", "wall_height", "scale", "hidden_charge", "spread", "vehicle"),
+    *("has_budget", "budget_left", "pieces_for_budget", "stock_left", "placed", "open_walls"),
+    *("legal", "most_open_cut", "cheapest", "posts_left"),
+)
+"""Features of the site and the layout as a whole."""
+
+
+class _View(NamedTuple):
+    """The candidates as seen from one place of the charge, (candidates,) unless stated otherwise.
+
+    Attributes:
+        along_m: Distance of the centre along the line from the charge to the walls.
+        aside_m: Distance aside of it.
+        columns: Static features that depend on the place (candidates, 14).
+        first: First bearing that the candidate hides.
+        last: Bearing after the last one.
+        hidden: Share of the height of the walls that it hides from the charge, 0 to 1.
+        shares: Share of the load of the walls by bearing (BEARINGS,).
+        distance_m: Distance from the charge to the middle of the walls.
+        half_angle: Half of the angle of the walls, rad.
+        wall_m: Height of the walls.
+        scale_m: Cube root of the charge's mass in kg.
+    """
+
+    along_m: FloatArray
+    aside_m: FloatArray
+    columns: FloatArray
+    first: IntArray
+    last: IntArray
+    hidden: FloatArray
+    shares: FloatArray
+    distance_m: float
+    half_angle: float
+    wall_m: float
+    scale_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The candidates of a site for a charge, or for some of the possible ones.
+
+    Attributes:
+        empty: The site without a piece.
+        numbers: Action of each candidate in the catalogue (candidates,).
+        static: Features of each (candidates, STATIC).
+        first: First bearing that each hides, by place of the charge (places, candidates).
+        last: Bearing after the last one (places, candidates).
+        hidden: Share of the walls' height that each hides (places, candidates).
+        shares: Share of the load by bearing (places, BEARINGS).
+        boxes_m: Left, bottom, right and top of each (candidates, 4).
+        frame_m: Position of each along and aside of the mean line, m (candidates, 2).
+        item: Number of the item of each (candidates,).
+        variant: Number of the variant of each (candidates,).
+        cost: Cost of each (candidates,).
+        site: Features of the site that do not change, the first seven of `WHOLE`.
+        is_measure: Whether each covers no cell (candidates,).
+        is_post: Whether each is of the line of posts that keeps vehicles away (candidates,).
+    """
+
+    empty: LayoutState
+    numbers: IntArray
+    static: FloatArray
+    first: IntArray
+    last: IntArray
+    hidden: FloatArray
+    shares: FloatArray
+    boxes_m: FloatArray
+    frame_m: FloatArray
+    item: IntArray
+    variant: IntArray
+    cost: FloatArray
+    site: FloatArray
+    is_measure: BoolArray
+    is_post: BoolArray
+
+    @classmethod
+    def of(cls, scenario: Scenario, charge: AnyCharge | None) -> "Candidates":
+        """Return the candidates of a site.
+
+        Args:
+            scenario: The scenario; it has a build zone and a protected structure.
+            charge: The charge, or `None` for some of the possible ones. A vehicle is at the worst
+                place behind the line of posts of the rule, if there is one.
+
+        Raises:
+            BlastEnvError: If the scenario has no build zone, or no structure is protected.
+        """
+        zone, empty = scenario.zone, LayoutState.empty(scenario)
+        protected = [structure for structure in scenario.structures if structure.protected]
+        if not protected:
+            raise BlastEnvError(f"{scenario.name}: no structure is protected")
+        walls = WallPoints.on(protected, scenario.air_height_m)
+        threats = case_for(scenario, charge).threats
+        posts, walled = _by_rule(scenario, charge)
+        charges = list(dict.fromkeys(threat.charge_against(scenario, posts) for threat in threats))
+        # 1. Where the candidates are, and what they are.
+        catalogue = empty.catalogue
+        number, row, column = np.nonzero(empty.legal)
+        variants = catalogue.variants
+        rows, columns = (np.array(size)[number] for size in zip(*catalogue.sizes, strict=True))
+        left_m, bottom_m = zone.rectangle_m[:2]
+        x_m, y_m = left_m + MODULE_SIDE_M * column, bottom_m + MODULE_SIDE_M * row
+        boxes_m = np.stack(
+            (x_m, y_m, x_m + MODULE_SIDE_M * columns, y_m + MODULE_SIDE_M * rows), axis=1
+        )
+        air_m = scenario.air_height_m
+        heights = [air_m if variant.height_m is None else variant.height_m for variant in variants]
+        height_m = np.array(heights)[number]
+        is_measure = rows == 0
+        cost = empty.costs[number, row, column]
+        # 2. What each hides, from each place of the charge.
+        views = [_view(one, walls, boxes_m, height_m, is_measure) for one in charges]
+        seen = np.stack([view.columns for view in views])
+        hidden_cut = seen[:, :, _HIDDEN_CUT]
+        budget = zone.budget
+        share = cost / budget if budget else np.zeros(len(cost))
+        numbers = np.flatnonzero(empty.legal.ravel())
+        is_post, is_wall = (
+            np.isin(numbers, [catalogue.action(element) for element in layout])
+            for layout in (posts, walled)
+        )
+        scale_m = float(np.mean([view.scale_m for view in views]))
+        vehicles = np.full(len(cost), bool(scenario.vehicles))
+        most_m = float(height_m.max(initial=_LEAST_M))
+        along_m = np.stack([view.along_m for view in views])
+        aside_m = np.stack([view.aside_m for view in views])
+        static = np.column_stack(
+            (
+                seen.mean(axis=0),
+                along_m.std(axis=0) / _LENGTH_M,
+                aside_m.std(axis=0) / _LENGTH_M,
+                hidden_cut.max(axis=0),
+                height_m / 3.0,
+                height_m / scale_m,
+                MODULE_SIDE_M * np.maximum(rows, columns) / 3.0,
+                MODULE_SIDE_M * np.minimum(rows, columns),
+                (rows * columns == 1),
+                np.array([variant.stops_vehicles for variant in variants])[number],
+                is_measure,
+                np.full(len(cost), not catalogue.has_items),
+                3.0 * share,
+                height_m / most_m,
+                hidden_cut.mean(axis=0) / (share + 0.02) / 5.0,
+                _in_reach(scenario, boxes_m) if scenario.vehicles else np.zeros(len(cost)),
+                vehicles,
+                is_post,
+                is_wall,
+            )
+        )
+        apart_m = [np.hypot(*np.subtract(one.position_m, charges[0].position_m)) for one in charges]
+        site = np.array(
+            [
+                np.mean([view.distance_m for view in views]) / (2.0 * _LENGTH_M),
+                np.mean([view.half_angle for view in views]),
+                np.mean([view.wall_m for view in views]) / _LENGTH_M,
+                scale_m / 5.0,
+                float(charge is None),
+                max(apart_m) / _LENGTH_M,
+                float(bool(scenario.vehicles)),
+            ]
+        )
+        return cls(
+            empty=empty,
+            numbers=numbers,
+            static=np.clip(static, -_MOST, _MOST).astype(np.float32),
+            first=np.stack([view.first for view in views]),
+            last=np.stack([view.last for view in views]),
+            hidden=np.stack([view.hidden for view in views]),
+            shares=np.stack([view.shares for view in views]),
+            boxes_m=boxes_m,
+            frame_m=np.stack((along_m.mean(axis=0), aside_m.mean(axis=0)), axis=1),
+            item=np.array([variant.item for variant in variants])[number],
+            variant=number,
+            cost=cost,
+            site=site.astype(np.float32),
+            is_measure=is_measure,
+            is_post=is_post,
+        )
+
+
+_HIDDEN_CUT: Final = STATIC.index("hidden_cut")
+
+
+def _view(
+    charge: Charge, walls: WallPoints, boxes_m: FloatArray, height_m: FloatArray, flat: BoolArray
+) -> _View:
+    """Return the candidates as seen from a place of the charge."""
+    # 1. The walls that the charge faces, weighted by area, slant and distance.
+    from_m = np.array(charge.position_m)
+    way_m = walls.points_m[:, :2] - from_m
+    far_m = np.maximum(np.hypot(way_m[:, 0], way_m[:, 1]), _LEAST_M)
+    facing = -(way_m * walls.outward).sum(axis=1) / far_m
+    weight = walls.area_m2 * np.maximum(facing, 0.02) / far_m
+    weight = weight / weight.sum()
+    towards_m = weight @ way_m
+    distance_m = max(float(np.hypot(*towards_m)), _LEAST_M)
+    ahead = towards_m / distance_m
+    faced = facing > 0.0 if bool(np.any(facing > 0.0)) else np.ones(len(facing), dtype=bool)
+    wall_m = float((walls.points_m[:, 2] + walls.to_roof_m)[faced].max())
+    angle = np.arctan2(way_m[:, 1] * ahead[0] - way_m[:, 0] * ahead[1], way_m @ ahead)
+    half_angle = max(float(np.abs(angle[faced]).max()), 0.05)
+    bin_of = np.clip((angle / half_angle + 1.0) / 2.0 * BEARINGS, 0, BEARINGS - 1).astype(np.int64)
+    counted = np.bincount(bin_of, weight * faced, BEARINGS)
+    shares: FloatArray = counted / counted.sum()
+    # 2. The candidates along and aside of the line, and the bearings that they hide.
+    half_m = (boxes_m[:, 2:] - boxes_m[:, :2]) / 2.0
+    centre_m = boxes_m[:, :2] + half_m - from_m
+    along_m = centre_m @ ahead
+    aside_m = centre_m[:, 1] * ahead[0] - centre_m[:, 0] * ahead[1]
+    half_along_m = half_m @ np.abs(ahead)
+    half_aside_m = half_m @ np.abs(ahead[::-1])
+    near_m = np.maximum(np.hypot(along_m, aside_m), _LEAST_M)
+    offset = np.arctan2(aside_m, along_m) / half_angle
+    half_offset = np.arctan2(half_aside_m, near_m) / half_angle
+    first, last = (
+        np.clip(np.rint((edge + 1.0) / 2.0 * BEARINGS), 0, BEARINGS).astype(np.int64)
+        for edge in (offset - half_offset, offset + half_offset)
+    )
+    before = (along_m > 0.0) & (along_m < distance_m) & ~flat
+    first, last = np.where(before, first, 0), np.where(before, last, 0)
+    up_to = np.append(0.0, np.cumsum(shares))
+    cut = up_to[last] - up_to[first]
+    # 3. How high the shadow is on the walls, and the way over the top.
+    start_m = charge.height_m
+    shadow_m = start_m + (height_m - start_m) * distance_m / np.maximum(along_m, _LEAST_M)
+    hidden = np.where(before, np.clip(shadow_m / wall_m, 0.0, 1.0), 0.0)
+    scale_m = float(np.cbrt(charge.tnt_kg))
+    there_m = np.clip(along_m, 0.0, distance_m)
+    rise_m = np.maximum(height_m - (start_m + there_m / distance_m * (wall_m / 2.0 - start_m)), 0.0)
+    over_m = np.hypot(there_m, rise_m) + np.hypot(distance_m - there_m, rise_m) - distance_m
+    to_walls_m = np.maximum(distance_m - along_m, _LEAST_M)
+    columns = np.column_stack(
+        (
+            along_m / _LENGTH_M,
+            (distance_m - along_m) / _LENGTH_M,
+            along_m / distance_m,
+            np.abs(aside_m) / _LENGTH_M,
+            np.abs(offset),
+            3.0 * cut,
+            3.0 * cut * hidden,
+            hidden,
+            over_m / scale_m,
+            before,
+            np.log(near_m / scale_m + _LEAST_SCALED),
+            np.log(to_walls_m / scale_m + _LEAST_SCALED),
+            half_along_m,
+            half_aside_m,
+        )
+    )
+    return _View(
+        along_m=along_m,
+        aside_m=aside_m,
+        columns=np.clip(columns, -_MOST, _MOST),
+        first=first,
+        last=last,
+        hidden=hidden,
+        shares=shares,
+        distance_m=distance_m,
+        half_angle=half_angle,
+        wall_m=wall_m,
+        scale_m=scale_m,
+    )
+
+
+def _by_rule(scenario: Scenario, charge: AnyCharge | None) -> tuple[Layout, Layout]:
+    """Return the layouts of the rules against vehicles, empty where they have none.
+
+    How posts close a way depends on all of them together, which relations of pairs do not show.
+    """
+    found: list[Layout] = []
+    for rule in (line_of_posts, posts_and_wall):
+        layout: Layout = ()
+        if scenario.vehicles:
+            with suppress(BlastEnvError):  # no posts in stock, or no way for a vehicle
+                layout = rule(scenario, charge)
+        found.append(layout)
+    return found[0], found[1]
+
+
+def _in_reach(scenario: Scenario, boxes_m: FloatArray) -> FloatArray:
+    """Return the share of each box that a vehicle can reach on the empty site (boxes,)."""
+    rows, columns = squares_of(scenario.site)
+    ground = np.zeros((rows, columns), dtype=bool)
+    for source in scenario.vehicles:
+        ground |= vehicle_reach(scenario, source).ground(rows, columns)
+    counted = np.zeros((rows + 1, columns + 1))
+    counted[1:, 1:] = ground.cumsum(axis=0).cumsum(axis=1)
+    left, bottom, right, top = np.rint(boxes_m / MODULE_SIDE_M).astype(np.int64).T
+    left, right = np.clip(left, 0, columns), np.clip(right, 0, columns)
+    bottom, top = np.clip(bottom, 0, rows), np.clip(top, 0, rows)
+    inside = counted[top, right] - counted[bottom, right] - counted[top, left]
+    inside += counted[bottom, left]
+    found: FloatArray = inside / np.maximum((right - left) * (top - bottom), 1)
+    return found
+
+
+class Standing:
+    """What the pieces of a layout that grows mean for the candidates.
+
+    Args:
+        candidates: The candidates.
+
+    Attributes:
+        placed: Number of pieces.
+        posts: Number of those of the line of posts.
+        spent: Their cost.
+    """
+
+    def __init__(self, candidates: Candidates) -> None:
+        count = len(candidates.numbers)
+        self._of = candidates
+        self._covered = np.zeros_like(candidates.shares)
+        self._gap_m = np.full(count, np.inf)
+        self._nearest = np.full(count, -1)
+        self.placed = 0
+        self.posts = 0
+        self.spent = 0.0
+
+    def copy(self) -> "Standing":
+        """Return an equal state that grows by itself."""
+        other = Standing.__new__(Standing)
+        other._of = self._of
+        other._covered, other._gap_m = self._covered.copy(), self._gap_m.copy()
+        other._nearest = self._nearest.copy()
+        other.placed, other.posts, other.spent = self.placed, self.posts, self.spent
+        return other
+
+    def add(self, index: int) -> None:
+        """Add the piece of a candidate, by its index."""
+        of = self._of
+        self.placed += 1
+        self.posts += int(of.is_post[index])
+        self.spent += float(of.cost[index])
+        if of.is_measure[index]:
+            return
+        for place in range(len(of.shares)):
+            part = slice(of.first[place, index], of.last[place, index])
+            np.maximum(
+                self._covered[place, part], of.hidden[place, index], out=self._covered[place, part]
+            )
+        left, bottom, right, top = of.boxes_m[index]
+        boxes_m = of.boxes_m
+        gap_m = np.hypot(
+            np.maximum(np.maximum(left - boxes_m[:, 2], boxes_m[:, 0] - right), 0.0),
+            np.maximum(np.maximum(bottom - boxes_m[:, 3], boxes_m[:, 1] - top), 0.0),
+        )
+        nearer = gap_m < self._gap_m
+        self._gap_m[nearer], self._nearest[nearer] = gap_m[nearer], index
+
+    def features(self, chosen: IntArray) -> FloatArray:
+        """Return the changing features of some candidates (chosen, CHANGING)."""
+        of = self._of
+        open_cut, covered = np.zeros(len(chosen)), np.zeros(len(chosen))
+        for place in range(len(of.shares)):
+            shares, cover = of.shares[place], self._covered[place]
+            first, last = of.first[place, chosen], of.last[place, chosen]
+            up_to = np.append(0.0, np.cumsum(shares * (1.0 - cover)))
+            cover_to = np.append(0.0, np.cumsum(cover))
+            open_cut += (up_to[last] - up_to[first]) * of.hidden[place, chosen]
+            covered += (cover_to[last] - cover_to[first]) / np.maximum(last - first, 1)
+        found = np.zeros((len(chosen), len(CHANGING)), dtype=np.float32)
+        found[:, 0] = 3.0 * open_cut / len(of.shares)
+        found[:, 1] = covered / len(of.shares)
+        budget = of.empty.scenario.zone.budget
+        if budget:
+            found[:, 9] = of.cost[chosen] / max(budget - self.spent, 1e-9)
+        if bool(np.isinf(self._gap_m[0])):
+            found[:, 2] = 1.0
+            return np.clip(found, -_MOST, _MOST)
+        gap_m, nearest = self._gap_m[chosen], self._nearest[chosen]
+        apart_m = np.abs(of.frame_m[chosen] - of.frame_m[nearest])
+        found[:, 3] = gap_m / 3.0
+        found[:, 4] = gap_m <= 0.0
+        found[:, 5:7] = apart_m / 2.0
+        found[:, 7] = of.item[chosen] == of.item[nearest]
+        found[:, 8] = of.variant[chosen] == of.variant[nearest]
+        return np.clip(found, -_MOST, _MOST)
+
+    def whole(self, chosen: IntArray, changing: FloatArray, stock_left: int) -> FloatArray:
+        """Return the features of site and layout (WHOLE,).
+
+        Args:
+            chosen: The candidates that are legal.
+            changing: Their changing features.
+            stock_left: Pieces left in all.
+        """
+        of, budget = self._of, self._of.empty.scenario.zone.budget
+        left = max(budget - self.spent, 0.0) if budget else 0.0
+        cheapest = float(of.cost[chosen].min(initial=np.inf))
+        open_walls = float((of.shares * (1.0 - self._covered)).sum(axis=1).mean())
+        changes = np.array(
+            [
+                float(budget is not None),
+                left / budget if budget else 0.0,
+                left / cheapest / 10.0 if budget and len(chosen) else 0.0,
+                stock_left / 20.0,
+                self.placed / 10.0,
+                open_walls,
+                len(chosen) / max(len(of.numbers), 1),
+                float(changing[:, 0].max(initial=0.0)),
+                cheapest / left if budget and left > 0.0 and len(chosen) else 0.0,
+                (int(of.is_post.sum()) - self.posts) / 10.0,
+            ],
+            dtype=np.float32,
+        )
+        return np.concatenate((of.site, np.clip(changes, -_MOST, _MOST)))
