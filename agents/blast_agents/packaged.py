@@ -5,17 +5,18 @@ walls and pieces (`policies.candidates`). `python -m studies.packaged_agent` tra
 It does without torch.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
@@ -45,15 +46,10 @@ MOST_DRAWS: Final = 10_000
 """Largest number of layouts of one call."""
 
 _MOST_BYTES: Final = 5_000_000
-_HEADER: Final = 8
-"""Bytes before the header of a file of safetensors: its length, least byte first."""
 
 
 def write_weights(weights: Weights, about: Mapping[str, str], path: Path) -> None:
     """Write weights as a file of safetensors, whole or not at all.
-
-    The format is a length, a JSON header with the place of each array, and the arrays
-    (github.com/huggingface/safetensors). So it needs no package, and can run no code when read.
 
     Args:
         weights: The arrays, which are written in single precision.
@@ -63,21 +59,13 @@ def write_weights(weights: Weights, about: Mapping[str, str], path: Path) -> Non
     Raises:
         BlastEnvError: If the file cannot be written.
     """
-    header: dict[str, Any] = {"__metadata__": dict(about)}
-    parts, end = [], 0
-    for name, values in sorted(weights.items()):
-        part = np.ascontiguousarray(values, dtype="<f4")
-        begin, end = end, end + part.nbytes
-        header[name] = {"dtype": "F32", "shape": list(part.shape), "data_offsets": [begin, end]}
-        parts.append(part.tobytes())
-    text = json.dumps(header, sort_keys=True).encode()
-    text += b" " * (-len(text) % _HEADER)  # the arrays begin at a multiple of 8 bytes
+    arrays = {name: np.ascontiguousarray(own, np.float32) for name, own in weights.items()}
     with write_atomically(path) as temporary:
-        temporary.write_bytes(len(text).to_bytes(_HEADER, "little") + text + b"".join(parts))
+        temporary.write_bytes(save(arrays, dict(about)))
 
 
 def read_weights(content: bytes, place: str) -> Weights:
-    """Return the arrays of a file of safetensors.
+    """Return the arrays of a file of safetensors, which can run no code.
 
     Args:
         content: The bytes of the file.
@@ -87,20 +75,14 @@ def read_weights(content: bytes, place: str) -> Weights:
         BlastEnvError: If it is damaged, or has arrays that are not finite or of another type.
     """
     try:
-        start = _HEADER + int.from_bytes(content[:_HEADER], "little")
-        header = json.loads(content[_HEADER:start])
-        header.pop("__metadata__", None)
-        found = {}
-        for name, entry in header.items():
-            if entry["dtype"] != "F32":
-                raise ValueError(f"{name} has the type {entry['dtype']}, must be F32")
-            begin, end = (start + offset for offset in entry["data_offsets"])
-            values = np.frombuffer(content[begin:end], dtype="<f4").reshape(entry["shape"])
-            if not np.isfinite(values).all():
-                raise ValueError(f"{name} has values that are not finite")
-            found[name] = values.astype(np.float32)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        found = load(content)
+    except SafetensorError as error:
         raise BlastEnvError(f"{place}: is damaged, or no file of safetensors: {error}") from error
+    for name, values in found.items():
+        if values.dtype != np.float32 or not np.isfinite(values).all():
+            raise BlastEnvError(
+                f"{place}: {name} has values of {values.dtype}, must have finite ones of float32"
+            )
     return found
 
 

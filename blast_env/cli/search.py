@@ -57,7 +57,7 @@ from blast_env.design.search.by_rule import DEFAULT_BUDGET, ProposerKind
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.registry import check_suits, proposer_row
 from blast_env.envs.episode import find_risk
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import (
     Evaluation,
     Evaluators,
@@ -399,7 +399,8 @@ def _without_blasts(method: str) -> tuple[Proposer, dict[str, str]]:
     digests = {"surrogate": packaged_surrogate().digest}
     if method == PACKAGE:
         return PackageProposer(), digests
-    from blast_agents.packaged import AgentProposer, packaged_agent
+    with import_extra("agents", "packaged agent"):
+        from blast_agents.packaged import AgentProposer, packaged_agent
 
     return AgentProposer(), digests | {"agent": packaged_agent().digest}
 

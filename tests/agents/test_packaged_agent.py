@@ -136,7 +136,9 @@ def test_damaged_weights_are_refused(tmp_path: Path, damage: str) -> None:
         path.write_bytes(b"")
     if damage == "type":
         path.write_bytes(content.replace(b'"F32"', b'"F64"'))
-    with pytest.raises(BlastEnvError, match=r"agent\.safetensors: (is damaged|has arrays)"):
+    with pytest.raises(
+        BlastEnvError, match=r"agent\.safetensors: (is damaged|has arrays|score has)"
+    ):
         load_packaged(path)
 
 
