@@ -33,8 +33,6 @@ FIRST_SEED: Final = 7_000
 _WORTH_IT: Final = 0.05
 """Share of the load: a site with less headroom leaves an agent little to win."""
 
-app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
-
 
 @dataclass(frozen=True)
 class Headroom:
@@ -74,8 +72,7 @@ def headroom_of(name: str, blasts: int, cache: Path | None) -> Headroom:
     return Headroom(rule, search)
 
 
-@app.command()
-def headroom(
+def main(
     kind: Annotated[
         list[str] | None, typer.Option(help="item_sites, kerb_sites, close_sites/SIDE.")
     ] = None,
@@ -125,4 +122,4 @@ def _row(family: str, found: Sequence[Headroom]) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    app()
+    typer.run(main)
