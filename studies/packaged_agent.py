@@ -321,7 +321,7 @@ def _logits(
 def train(
     shown: Annotated[list[Path], typer.Argument(help="Files of `show`.")],
     out: Annotated[Path, typer.Option(help="The weights.")] = Path(
-        "agents/blast_agents/packaged_agent.safetensors"
+        "out/packaged/packaged_agent.safetensors"
     ),
     width: Annotated[int, typer.Option(min=1, help="Width of the hidden layers.")] = 64,
     epochs: Annotated[int, typer.Option(min=1)] = 15,

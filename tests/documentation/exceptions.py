@@ -158,6 +158,20 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.benchmark headroom visitor_entrance-known": "--blasts 1",
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
+    # docs/researchers/sites.md
+    "python -m studies.headroom --kind item_sites --kind kerb_sites --sites 10 --blasts 30": (
+        "--sites 2 --blasts 2"
+    ),
+    # docs/researchers/training.md
+    "python -m studies.packaged_agent show --out out/packaged/shown.jsonl": (
+        "--rounds 1 --changes 5"
+    ),
+    "python -m studies.packaged_agent train out/packaged/shown.jsonl": "--epochs 1 --held-out 2",
+    "python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 20": (
+        "--sites 2"
+    ),
+    "python -m studies.packaged_agent judge control_room school_and_clinic visitor_entrance"
+    " hotel_forecourt shopping_street": "--charges 2",
     # docs/researchers/surrogate.md
     "python -m studies.surrogate blasts --kind kerb_sites --sites 100 --layouts 8 --rules 5"
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",
