@@ -78,9 +78,12 @@ class _Sources:
     def add(self, value: Any, name: str = "") -> None:
         """Add what a name in a compiled function stands for, and all that this uses in turn."""
         value = getattr(value, "py_func", value)  # a function, where it is compiled
-        if isinstance(value, ModuleType) or id(value) in self._seen:
+        if id(value) in self._seen:
             return
-        if not callable(value):
+        if isinstance(value, ModuleType):  # of its names each one may be used
+            if value.__name__.partition(".")[0] == self.package:
+                self._add_file(value.__name__)
+        elif not callable(value):
             held = value.tobytes() if isinstance(value, np.ndarray) else value
             self.constants.append(f"{name} = {held!r}")
         elif str(value.__module__).partition(".")[0] == self.package:

@@ -21,7 +21,7 @@ from blast_env.site import Scenario
 from blast_env.values import count_of
 
 _THREATS: Final = (
-    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
+    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs in the open (m)"),
     *("level", "panes broken", "pane (GSA, ISO)", "panel", "verdict"),
 )
 _STAND_OFFS: Final = (
@@ -68,7 +68,7 @@ def screening_answer(
         yield from map(Line.of, _unknown_words(threat))
     for threat in found.threats:
         title = (
-            f"stand-off (m) from which a component allows a level, {threat.name},"
+            f"stand-off in the open (m) from which a component allows a level, {threat.name},"
             f" {threat.charge.tnt_kg:g} kg TNT (* on this site)"
         )
         yield Table.of(title, _STAND_OFFS, _stand_off_rows(found, threat))

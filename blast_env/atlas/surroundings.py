@@ -180,7 +180,10 @@ class SiteAtlas:
         return Surroundings(factors, np.ones(count, bool), tuple(words), tuple(unknown))
 
     def _away(self, wall: "_Wall", solid: Solid, structure: str) -> Surroundings:
-        """Return the shadow on a wall of a rectangular building that faces away."""
+        """Return the shadow on a wall of a rectangular building that faces away.
+
+        The law is of buildings that stand alone: one behind throws the wave back into the shadow.
+        """
         count = len(wall.middles)
         own = [index for index, name in enumerate(solid.structures) if name == structure]
         none = ("",) * count
@@ -190,9 +193,14 @@ class SiteAtlas:
         normals = np.broadcast_to(wall.normal, (count, 3))
         numbers = shadow.numbers_of_shadow(wall.charge, wall.middles, normals, box)
         factors = self._laws.shadow.factors(numbers)
+        others = solid.is_building & (np.arange(len(solid.boxes)) != own[0])
+        name = "in the shadow of its building"
+        if between.lies_before(wall.middles, wall.normal, solid.boxes[others]).any():
+            factors = factors._replace(in_range=np.zeros(count, dtype=bool))
+            name = f"{name}, with another behind that may add load"
         words, unknown = [""] * count, [""] * count
         every = np.ones(count, dtype=bool)
-        _note(words, unknown, "in the shadow of its building", factors, every)
+        _note(words, unknown, name, factors, every)
         return Surroundings(
             factors.where_known(), np.zeros(count, bool), tuple(words), tuple(unknown)
         )

@@ -7,14 +7,15 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env.atlas import packaged_laws
+from blast_env.evaluation.questions.screening import screen
 from blast_env.parquet import read_frame
 from blast_env.units import MODULE_SIDE_M
 from studies.atlas.__main__ import app
 from studies.atlas.families import FAMILIES
 from studies.atlas.findings import inside_rows
-from studies.atlas.runs import COLUMNS, groups_in, groups_of, rounds, run_group
+from studies.atlas.runs import COARSE, COLUMNS, groups_in, groups_of, rounds, run_group
 from studies.atlas.samples import scenes_with_loads
-from studies.atlas.scenes import CUBE_ROOT, Box, Scene, scaled_impulse
+from studies.atlas.scenes import CUBE_ROOT, Box, Scene, loads_of, scaled_impulse
 
 DATA = Path(__file__).parents[2] / "docs" / "data" / "atlas_blasts.parquet"
 FITTED = ("opposite", "shadow")
@@ -89,3 +90,22 @@ def test_new_designs_are_run_and_judged(tmp_path: Path) -> None:
     )
     assert done.exit_code == 0, done.output
     assert "the walls of a block out of sight | 1 |" in done.output
+
+
+def test_a_house_behind_the_shadow_takes_the_shadow_away_and_is_named() -> None:
+    """It throws the wave back: gas has more than twice what the shadow alone would leave."""
+    block = Box(24, -12, 16, 24, 14)
+    loads, screened = [], []
+    for others in ((), (Box(48, -18, 8, 36, 20),)):
+        scene = Scene({}, block, ("east",), others)
+        loads.append(loads_of(scene, COARSE).impulse.mean() * CUBE_ROOT)
+        screened.append(screen(scene.scenario(), (), (), packaged_laws()).threats[0].bays)
+    alone, behind = screened
+    assert loads[1] > 2.0 * loads[0]
+    for bay in alone:
+        assert bay.factor[0] < 0.6
+        assert (bay.around, bay.unknown) == ("in the shadow of its building", "")
+    for bay in behind:
+        assert bay.factor == (1.0, 1.0, 1.0)
+        assert bay.unknown.endswith("another behind that may add load")
+    assert np.mean([bay.impulse_pa_s for bay in behind]) > 0.7 * loads[1]

@@ -49,8 +49,9 @@ from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 
 LEFT_OUT: Final = (
-    "left out: surroundings outside the range of the atlas, clearing round edges, suction, and"
-    " breaching nearer than 1.7 m/kg^(1/3)"
+    "left out: surroundings outside the range of the atlas, walls and pieces that fail or move,"
+    " clearing round edges, suction, and breaching nearer than 1.7 m/kg^(1/3); stand-offs are those"
+    " of open ground, and streets and courts need more"
 )
 """What screening does not know."""
 
