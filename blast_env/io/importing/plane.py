@@ -1,7 +1,7 @@
 """Conversion between the coordinates of maps and drawings and the metres of a site."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from math import atan2, degrees
 from typing import Final
 
@@ -13,6 +13,7 @@ from blast_env.site.sections import AnyGeoreference, DrawingGeoreference, MapGeo
 
 with import_extra("maps", "maps and drawings"):
     from pyproj import CRS, Transformer
+    from pyproj.enums import TransformDirection
     from pyproj.exceptions import CRSError, ProjError
 
 _FAR_DEG: Final = 1.0  # outside the area of use of a reference system
@@ -43,9 +44,7 @@ class LocalPlane:
                 near a pole, or far outside the system's area of use.
         """
         system = _system(crs)
-        longitude, latitude = _transformed(
-            Transformer.from_crs(system, "EPSG:4326", always_xy=True), np.array([place])
-        )[0]
+        longitude, latitude = _transformed(_to_degrees(crs), np.array([place]))[0]
         x, y = place
         words = f"the place ({x:.10g}, {y:.10g})"
         outside = not np.isfinite([longitude, latitude]).all() or abs(latitude) > 90.0
@@ -72,7 +71,7 @@ class LocalPlane:
 
     def to_source(self, places_m: FloatArray) -> FloatArray:
         """Return places of the plane (n, 2), in metres, in the coordinates of the map (n, 2)."""
-        return _transformed(self._from_plane, places_m)
+        return _transformed(self._to_plane, places_m, TransformDirection.INVERSE)
 
     def georeference(self, corner_m: tuple[float, float], rotation_deg: float) -> MapGeoreference:
         """Return the georeference of a site whose lower left corner lies in this plane.
@@ -95,20 +94,9 @@ class LocalPlane:
             crs=self.crs,
         )
 
-    @cached_property
-    def _projection(self) -> CRS:
-        return CRS.from_proj4(
-            f"+proj=tmerc +lat_0={self.latitude_deg!r} +lon_0={self.longitude_deg!r} +k=1 +x_0=0 "
-            "+y_0=0 +datum=WGS84 +units=m +no_defs"
-        )
-
-    @cached_property
+    @property
     def _to_plane(self) -> Transformer:
-        return Transformer.from_crs(_system(self.crs), self._projection, always_xy=True)
-
-    @cached_property
-    def _from_plane(self) -> Transformer:
-        return Transformer.from_crs(self._projection, _system(self.crs), always_xy=True)
+        return _to_plane(self.crs, self.longitude_deg, self.latitude_deg)
 
 
 @dataclass(frozen=True)
@@ -212,6 +200,21 @@ def _system(crs: str) -> CRS:
     return system
 
 
+# It takes tens of milliseconds to make a transformer, and a site needs few of them many times.
+@lru_cache(maxsize=64)
+def _to_degrees(crs: str) -> Transformer:
+    return Transformer.from_crs(_system(crs), "EPSG:4326", always_xy=True)
+
+
+@lru_cache(maxsize=64)
+def _to_plane(crs: str, longitude_deg: float, latitude_deg: float) -> Transformer:
+    plane = CRS.from_proj4(
+        f"+proj=tmerc +lat_0={latitude_deg!r} +lon_0={longitude_deg!r} +k=1 +x_0=0 +y_0=0 "
+        "+datum=WGS84 +units=m +no_defs"
+    )
+    return Transformer.from_crs(_system(crs), plane, always_xy=True)
+
+
 def _check_area_of_use(system: CRS, crs: str, words: str, place: tuple[float, float]) -> None:
     """Refuse a place outside the area of use of a reference system: a sign of the wrong one."""
     area = system.area_of_use
@@ -230,9 +233,13 @@ def _check_area_of_use(system: CRS, crs: str, words: str, place: tuple[float, fl
         )
 
 
-def _transformed(transformer: Transformer, places: FloatArray) -> FloatArray:
+def _transformed(
+    transformer: Transformer,
+    places: FloatArray,
+    direction: TransformDirection = TransformDirection.FORWARD,
+) -> FloatArray:
     try:
-        x, y = transformer.transform(places[:, 0], places[:, 1])
+        x, y = transformer.transform(places[:, 0], places[:, 1], direction=direction)
     except ProjError as error:
         raise BlastEnvError(f"coordinates cannot be transformed: {reason_of(error)}") from error
     return np.stack([np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)], axis=1)
