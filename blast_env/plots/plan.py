@@ -63,7 +63,7 @@ three others."""
 
 _DARKER: Final = 0.6  # factor for a ninth item, which has the colour of the first one, darker
 _DIGITS: Final = 9  # decimals of a metre; further digits are rounding errors
-_WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125)
+_WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125, *((k + 0.5) / 32 for k in range(32)))
 
 
 @dataclass(frozen=True)
@@ -313,8 +313,13 @@ def site_features(
     zone, there = scenario.build_zone, scenario.structures_with(layout)
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
-        found += zone_features(zone, [box for structure in there for box in structure.boxes_m])
-        found += barrier_features(scenario, layout)
+        barriers = [*barrier_features(scenario, layout)]
+        found += zone_features(
+            zone,
+            [box for structure in there for box in structure.boxes_m],
+            [barrier.bounds_m for barrier in barriers],
+        )
+        found += barriers
     found += structure_features(there)
     found += (
         _structure_feature(Kinds.TAKEN_AWAY, structure)
@@ -403,12 +408,15 @@ def charge_feature(charge: Charge, name: str, label: str = "") -> Feature:
 # The build zone.
 
 
-def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Feature]:
+def zone_features(
+    zone: BuildZone, structures_m: Sequence[Rectangle], barriers_m: Sequence[Rectangle] = ()
+) -> list[Feature]:
     """Return the build zone and every condition of it that has a place.
 
     Args:
         zone: The build zone.
         structures_m: Rectangles of the structures, which the drawn access way avoids.
+        barriers_m: Rectangles of the barriers, which it avoids where a straight way is left.
     """
     conditions: dict[str, str | float] = {"stock": zone.stock, "clearance_m": zone.clearance_m}
     if zone.items:
@@ -427,36 +435,47 @@ def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Fe
         area_feature(Kinds.KEEP_OUT, keep_out.rectangle_m, keep_out.reason)
         for keep_out in zone.keep_outs
     )
-    return [*found, *_way_features(zone, structures_m)]
+    return [*found, *_way_features(zone, structures_m, barriers_m)]
 
 
-def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterator[Feature]:
+def _way_features(
+    zone: BuildZone, structures_m: Sequence[Rectangle], barriers_m: Sequence[Rectangle]
+) -> Iterator[Feature]:
     """Yield the access way of a zone and its gate.
 
-    A scenario does not fix the course of the way; its arrow avoids structures, or runs through the
-    gate.
+    A scenario does not fix the course of the way. Its arrow is straight, through the gate: it
+    avoids structures and barriers, else only structures, as where the way that is left is winding.
     """
     way = zone.access_way
     if way is None:
         return
-    left, bottom, right, top = zone.rectangle_m
-    places = [
-        (left + share * (right - left), bottom + share * (top - bottom)) for share in _WAY_PLACES
-    ]
+    across_m = zone.rectangle_m if way.gate is None else way.gate.rectangle_m
     if way.gate is not None:
-        yield area_feature(Kinds.GATE, way.gate.rectangle_m, "gate of the access way")
-        places = [way.gate.rectangle_m.centre]
-    arrows = [
-        ((left, y), (right, y)) if way.between == "left_right" else ((x, bottom), (x, top))
-        for x, y in places
-    ]
-    free = (
-        ends
-        for ends in arrows
-        if not any(structure_m.intersects_segment(*ends) for structure_m in structures_m)
-    )
-    ends = next(free, arrows[0])
+        yield area_feature(Kinds.GATE, across_m, "gate of the access way")
+    arrows = [_arrow(zone, across_m, share) for share in _WAY_PLACES]
+    beside_m = way.width_m / 2.0 - MODULE_SIDE_M / 4.0  # whole modules are left beside its middle
+    grown_m = [barrier_m.grown(beside_m) for barrier_m in barriers_m]
+    for avoided_m in ([*structures_m, *grown_m], structures_m):
+        free = (
+            arrow
+            for arrow in arrows
+            if not any(box.intersects_segment(*arrow) for box in avoided_m)
+        )
+        if arrow := next(free, None):
+            break
+    ends = arrow or arrows[0]
     yield Feature(Kinds.ACCESS_WAY, tuple(rounded_m(*end) for end in ends), way.description)
+
+
+def _arrow(zone: BuildZone, across_m: Rectangle, share: float) -> tuple[PointM, PointM]:
+    """Return a straight access way through a zone, at a share of a gate or of the zone."""
+    assert zone.access_way is not None
+    left, bottom, right, top = zone.rectangle_m
+    if zone.access_way.between == "left_right":
+        y = across_m.bottom + share * (across_m.top - across_m.bottom)
+        return (left, y), (right, y)
+    x = across_m.left + share * (across_m.right - across_m.left)
+    return (x, bottom), (x, top)
 
 
 def cell_features(zone: BuildZone, cells: BoolArray) -> Iterator[Feature]:

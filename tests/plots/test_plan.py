@@ -56,8 +56,8 @@ def _soft_ground(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have the zone say one more thing, as a new condition of it would."""
     known = blast_env.plots.plan.zone_features
 
-    def more(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Feature]:
-        return [*known(zone, structures_m), area_feature(SOFT, PLACE, "a bog")]
+    def more(zone: BuildZone, *avoided_m: Sequence[Rectangle]) -> list[Feature]:
+        return [*known(zone, *avoided_m), area_feature(SOFT, PLACE, "a bog")]
 
     monkeypatch.setattr(blast_env.plots.plan, "zone_features", more)
 
@@ -299,6 +299,23 @@ def test_conditions_of_the_zone_are_drawn() -> None:
         "gate of the access way",
         "no-build area",
     } <= set(words)
+
+
+def test_an_access_way_is_drawn_beside_the_barriers_that_leave_it() -> None:
+    """Modules stand across the middle of the zone, where the way would be drawn without them."""
+    zone = site_document()["build_zone"] | {"access_way": {"width_m": 1.0, "between": "left_right"}}
+    site = gate_site(build_zone=zone)
+    rows, _ = site.zone.shape
+    layout = [(row, 1) for row in range(rows // 4 - 1, rows - 2)]
+
+    def arrow_of(layout: Sequence[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
+        features = site_features(site, layout)
+        (way,) = (feature for feature in features if feature.kind is Kinds.ACCESS_WAY)
+        return way.places_m
+
+    pieces_m = [site.zone.element_rectangle_m(cell).grown(0.2) for cell in layout]
+    assert any(piece_m.intersects_segment(*arrow_of(())) for piece_m in pieces_m)
+    assert not any(piece_m.intersects_segment(*arrow_of(layout)) for piece_m in pieces_m)
 
 
 def test_north_is_marked_where_it_is_known() -> None:
