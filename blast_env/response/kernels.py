@@ -201,24 +201,32 @@ def bend(
     risk = strength if strength > 0.0 else -np.log1p(-0.5 * share)
     broken = min(np.searchsorted(track[0], risk ** (1.0 / exponent)), steps - 1)
     break_s = time_s[0] + (broken + 1) * step_s
-    left = 0.0
-    if break_s < time_s[-1]:
-        after = np.searchsorted(time_s, break_s, side="right")
-        gone = (break_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
-        # The largest impulse still to come, not all of it: later suction does not call fragments
-        # back.
-        there = pressure_pa[after - 1] + gone * (pressure_pa[after] - pressure_pa[after - 1])
-        come = 0.5 * (there + pressure_pa[after]) * (time_s[after] - break_s)
-        left = max(come, 0.0)
-        for upper in range(after + 1, len(time_s)):
-            rest = pressure_pa[upper - 1] + pressure_pa[upper]
-            come += 0.5 * rest * (time_s[upper] - time_s[upper - 1])
-            left = max(left, come)
     out[0], out[1], out[2] = peak, share, break_s
-    out[3], out[4], out[5] = track[1, broken], track[2, broken], left
+    out[3], out[4] = track[1, broken], track[2, broken]
+    out[5] = _impulse_to_come(time_s, pressure_pa, break_s)
     # Frames have to hold until nearly all panes have broken.
     last = np.searchsorted(track[0], _STRONGEST ** (1.0 / exponent))
     out[6] = max(0.0, track[1, : last + 1].max())
+
+
+@compiled()
+def _impulse_to_come(time_s: FloatArray, pressure_pa: FloatArray, from_s: float) -> float:
+    """Return the largest impulse from a time on, Pa s; 0 after the history.
+
+    The largest, not all of it: later suction does not call fragments back.
+    """
+    if from_s >= time_s[-1]:
+        return 0.0
+    after = np.searchsorted(time_s, from_s, side="right")
+    gone = (from_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
+    there = pressure_pa[after - 1] + gone * (pressure_pa[after] - pressure_pa[after - 1])
+    come = 0.5 * (there + pressure_pa[after]) * (time_s[after] - from_s)
+    largest = max(come, 0.0)
+    for upper in range(after + 1, len(time_s)):
+        rest = pressure_pa[upper - 1] + pressure_pa[upper]
+        come += 0.5 * rest * (time_s[upper] - time_s[upper - 1])
+        largest = max(largest, come)
+    return largest
 
 
 @compiled()

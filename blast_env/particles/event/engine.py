@@ -97,18 +97,9 @@ def run_until(
         if events == _EVENTS_PER_CALL:
             return PAUSED
         events += 1
-        if progress.collisions >= progress.next_check:
-            progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
-            if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
-                return OUT_OF_REACH
-        if progress.collisions >= rules.most_collisions:
-            return EVENT_LIMIT
-        if progress.records == len(record):
-            return RECORD_FULL
-        if heap[0].ball == 0 or heap[1].time_s == inf:
-            return OUT_OF_REACH  # no further event
-        if heap[1].time_s > until_s:
-            return UNTIL
+        reason = _bound(balls, heap, targets, rules, progress, len(record), until_s)
+        if reason >= 0:
+            return reason
         # 2. The earliest event, the root of the heap.
         ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
         # 3. A change of cell.
@@ -140,6 +131,30 @@ def run_until(
             if loads[module].impulse > loads[module].capacity:
                 progress.stage = CHANGED
                 return MODULE_DESTROYED
+
+
+@njit(error_model="numpy")
+def _bound(
+    balls: RecordArray,
+    heap: RecordArray,
+    targets: NDArray[np.float64],
+    rules: Record,
+    progress: Record,
+    most_records: int,
+    until_s: float,
+) -> int:
+    """Return the reason to stop before the next event, -1 if there is none."""
+    if progress.collisions >= progress.next_check:
+        progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
+        if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
+            return OUT_OF_REACH
+    if progress.collisions >= rules.most_collisions:
+        return EVENT_LIMIT
+    if progress.records == most_records:
+        return RECORD_FULL
+    if heap[0].ball == 0 or heap[1].time_s == inf:
+        return OUT_OF_REACH  # no further event
+    return UNTIL if heap[1].time_s > until_s else -1
 
 
 @njit(error_model="numpy")
