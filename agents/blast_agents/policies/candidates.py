@@ -6,6 +6,7 @@ stand, in the frame of the line from the charge to the walls. So a turned or mir
 same features, and their number does not depend on the site.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -16,7 +17,7 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.design.bollards import line_of_posts, posts_and_wall
 from blast_env.design.search.learnt import case_for
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import vehicle_reach
 from blast_env.site import AnyCharge, Scenario
@@ -61,6 +62,43 @@ WHOLE: Final = (
 """Features of the site and the layout as a whole."""
 
 
+class _FacedWalls(NamedTuple):
+    """The walls as one place of the charge sees them.
+
+    Attributes:
+        ahead: Unit vector from the charge to their middle.
+        distance_m: Distance to that middle.
+        half_angle: Half of their angle, rad.
+        height_m: Height of the highest one.
+        shares: Share of the load by bearing (BEARINGS,).
+    """
+
+    ahead: FloatArray
+    distance_m: float
+    half_angle: float
+    height_m: float
+    shares: FloatArray
+
+    @classmethod
+    def from_charge(cls, from_m: FloatArray, walls: WallPoints) -> "_FacedWalls":
+        """Return the walls that a charge faces, weighted by area, slant and distance."""
+        way_m = walls.points_m[:, :2] - from_m
+        far_m = np.maximum(np.hypot(way_m[:, 0], way_m[:, 1]), _LEAST_M)
+        facing = -(way_m * walls.outward).sum(axis=1) / far_m
+        weight = walls.area_m2 * np.maximum(facing, 0.02) / far_m
+        weight = weight / weight.sum()
+        towards_m = weight @ way_m
+        distance_m = max(float(np.hypot(*towards_m)), _LEAST_M)
+        ahead = towards_m / distance_m
+        faced = facing > 0.0 if bool(np.any(facing > 0.0)) else np.ones(len(facing), dtype=bool)
+        height_m = float((walls.points_m[:, 2] + walls.to_roof_m)[faced].max())
+        angle = np.arctan2(way_m[:, 1] * ahead[0] - way_m[:, 0] * ahead[1], way_m @ ahead)
+        half_angle = max(float(np.abs(angle[faced]).max()), 0.05)
+        place = np.clip((angle / half_angle + 1.0) / 2.0 * BEARINGS, 0, BEARINGS - 1)
+        counted = np.bincount(place.astype(np.int64), weight * faced, BEARINGS)
+        return cls(ahead, distance_m, half_angle, height_m, counted / counted.sum())
+
+
 class _View(NamedTuple):
     """The candidates as seen from one place of the charge, (candidates,) unless stated otherwise.
 
@@ -71,10 +109,7 @@ class _View(NamedTuple):
         first: First bearing that the candidate hides.
         last: Bearing after the last one.
         hidden: Share of the height of the walls that it hides from the charge, 0 to 1.
-        shares: Share of the load of the walls by bearing (BEARINGS,).
-        distance_m: Distance from the charge to the middle of the walls.
-        half_angle: Half of the angle of the walls, rad.
-        wall_m: Height of the walls.
+        faced: The walls.
         scale_m: Cube root of the charge's mass in kg.
     """
 
@@ -84,10 +119,7 @@ class _View(NamedTuple):
     first: IntArray
     last: IntArray
     hidden: FloatArray
-    shares: FloatArray
-    distance_m: float
-    half_angle: float
-    wall_m: float
+    faced: _FacedWalls
     scale_m: float
 
 
@@ -142,10 +174,7 @@ class Candidates:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
         """
         zone, empty = scenario.zone, LayoutState.empty(scenario)
-        protected = [structure for structure in scenario.structures if structure.protected]
-        if not protected:
-            raise BlastEnvError(f"{scenario.name}: no structure is protected")
-        walls = WallPoints.on(protected, scenario.air_height_m)
+        walls = _protected_walls(scenario)
         threats = case_for(scenario, charge).threats
         posts, walled = _by_rule(scenario, charge)
         charges = list(dict.fromkeys(threat.charge_against(scenario, posts) for threat in threats))
@@ -154,66 +183,37 @@ class Candidates:
         number, row, column = np.nonzero(empty.legal)
         variants = catalogue.variants
         rows, columns = (np.array(size)[number] for size in zip(*catalogue.sizes, strict=True))
-        left_m, bottom_m = zone.rectangle_m[:2]
-        x_m, y_m = left_m + MODULE_SIDE_M * column, bottom_m + MODULE_SIDE_M * row
-        boxes_m = np.stack(
-            (x_m, y_m, x_m + MODULE_SIDE_M * columns, y_m + MODULE_SIDE_M * rows), axis=1
-        )
+        boxes_m = _boxes_m(zone.rectangle_m, row, column, rows, columns)
         air_m = scenario.air_height_m
         heights = [air_m if variant.height_m is None else variant.height_m for variant in variants]
         height_m = np.array(heights)[number]
         is_measure = rows == 0
         cost = empty.costs[number, row, column]
-        # 2. What each hides, from each place of the charge.
-        views = [_view(one, walls, boxes_m, height_m, is_measure) for one in charges]
-        seen = np.stack([view.columns for view in views])
-        hidden_cut = seen[:, :, _HIDDEN_CUT]
-        budget = zone.budget
-        share = cost / budget if budget else np.zeros(len(cost))
         numbers = np.flatnonzero(empty.legal.ravel())
         is_post, is_wall = (
             np.isin(numbers, [catalogue.action(element) for element in layout])
             for layout in (posts, walled)
         )
-        scale_m = float(np.mean([view.scale_m for view in views]))
-        vehicles = np.full(len(cost), bool(scenario.vehicles))
-        most_m = float(height_m.max(initial=_LEAST_M))
-        along_m = np.stack([view.along_m for view in views])
-        aside_m = np.stack([view.aside_m for view in views])
+        # 2. What each hides, from each place of the charge.
+        views = [_view(one, walls, boxes_m, height_m, is_measure) for one in charges]
+        # 3. The features: as seen on average, its own, and those of the site.
+        seen = _seen(views)
+        share = cost / zone.budget if zone.budget else np.zeros(len(cost))
         static = np.column_stack(
             (
-                seen.mean(axis=0),
-                along_m.std(axis=0) / _LENGTH_M,
-                aside_m.std(axis=0) / _LENGTH_M,
-                hidden_cut.max(axis=0),
-                height_m / 3.0,
-                height_m / scale_m,
-                MODULE_SIDE_M * np.maximum(rows, columns) / 3.0,
-                MODULE_SIDE_M * np.minimum(rows, columns),
-                (rows * columns == 1),
+                seen,
+                _sizes(rows, columns, height_m, views),
                 np.array([variant.stops_vehicles for variant in variants])[number],
                 is_measure,
                 np.full(len(cost), not catalogue.has_items),
                 3.0 * share,
-                height_m / most_m,
-                hidden_cut.mean(axis=0) / (share + 0.02) / 5.0,
+                height_m / float(height_m.max(initial=_LEAST_M)),
+                seen[:, _HIDDEN_CUT] / (share + 0.02) / 5.0,
                 _in_reach(scenario, boxes_m) if scenario.vehicles else np.zeros(len(cost)),
-                vehicles,
+                np.full(len(cost), bool(scenario.vehicles)),
                 is_post,
                 is_wall,
             )
-        )
-        apart_m = [np.hypot(*np.subtract(one.position_m, charges[0].position_m)) for one in charges]
-        site = np.array(
-            [
-                np.mean([view.distance_m for view in views]) / (2.0 * _LENGTH_M),
-                np.mean([view.half_angle for view in views]),
-                np.mean([view.wall_m for view in views]) / _LENGTH_M,
-                scale_m / 5.0,
-                float(charge is None),
-                max(apart_m) / _LENGTH_M,
-                float(bool(scenario.vehicles)),
-            ]
         )
         return cls(
             empty=empty,
@@ -222,13 +222,13 @@ class Candidates:
             first=np.stack([view.first for view in views]),
             last=np.stack([view.last for view in views]),
             hidden=np.stack([view.hidden for view in views]),
-            shares=np.stack([view.shares for view in views]),
+            shares=np.stack([view.faced.shares for view in views]),
             boxes_m=boxes_m,
-            frame_m=np.stack((along_m.mean(axis=0), aside_m.mean(axis=0)), axis=1),
+            frame_m=_frame_m(views),
             item=np.array([variant.item for variant in variants])[number],
             variant=number,
             cost=cost,
-            site=site.astype(np.float32),
+            site=_site_features(scenario, charge, charges, views),
             is_measure=is_measure,
             is_post=is_post,
         )
@@ -237,27 +237,82 @@ class Candidates:
 _HIDDEN_CUT: Final = STATIC.index("hidden_cut")
 
 
+def _protected_walls(scenario: Scenario) -> WallPoints:
+    """Return points on the walls whose load counts; refuse a site without one."""
+    protected = [structure for structure in scenario.structures if structure.protected]
+    if not protected:
+        raise BlastEnvError(f"{scenario.name}: no structure is protected")
+    return WallPoints.on(protected, scenario.air_height_m)
+
+
+def _boxes_m(
+    zone_m: Rectangle, row: IntArray, column: IntArray, rows: IntArray, columns: IntArray
+) -> FloatArray:
+    """Return left, bottom, right and top of candidates on the cells of a zone (candidates, 4)."""
+    x_m, y_m = zone_m.left + MODULE_SIDE_M * column, zone_m.bottom + MODULE_SIDE_M * row
+    return np.stack((x_m, y_m, x_m + MODULE_SIDE_M * columns, y_m + MODULE_SIDE_M * rows), axis=1)
+
+
+def _seen(views: Sequence[_View]) -> FloatArray:
+    """Return the features as seen from all places: means, spreads, and the most that is cut."""
+    columns = np.stack([view.columns for view in views])
+    return np.column_stack(
+        (
+            columns.mean(axis=0),
+            np.stack([view.along_m for view in views]).std(axis=0) / _LENGTH_M,
+            np.stack([view.aside_m for view in views]).std(axis=0) / _LENGTH_M,
+            columns[:, :, _HIDDEN_CUT].max(axis=0),
+        )
+    )
+
+
+def _frame_m(views: Sequence[_View]) -> FloatArray:
+    """Return the position of each along and aside of the mean line, m (candidates, 2)."""
+    along_m = np.mean([view.along_m for view in views], axis=0)
+    return np.stack((along_m, np.mean([view.aside_m for view in views], axis=0)), axis=1)
+
+
+def _sizes(
+    rows: IntArray, columns: IntArray, height_m: FloatArray, views: Sequence[_View]
+) -> FloatArray:
+    """Return the features of the size of the candidates (candidates, 5)."""
+    scale_m = float(np.mean([view.scale_m for view in views]))
+    return np.column_stack(
+        (
+            height_m / 3.0,
+            height_m / scale_m,
+            MODULE_SIDE_M * np.maximum(rows, columns) / 3.0,
+            MODULE_SIDE_M * np.minimum(rows, columns),
+            rows * columns == 1,
+        )
+    )
+
+
+def _site_features(
+    scenario: Scenario, charge: AnyCharge | None, charges: Sequence[Charge], views: Sequence[_View]
+) -> FloatArray:
+    """Return the features of the site for a charge at some places, the first seven of `WHOLE`."""
+    apart_m = [np.hypot(*np.subtract(one.position_m, charges[0].position_m)) for one in charges]
+    features = (
+        np.mean([view.faced.distance_m for view in views]) / (2.0 * _LENGTH_M),
+        np.mean([view.faced.half_angle for view in views]),
+        np.mean([view.faced.height_m for view in views]) / _LENGTH_M,
+        float(np.mean([view.scale_m for view in views])) / 5.0,
+        float(charge is None),
+        max(apart_m) / _LENGTH_M,
+        float(bool(scenario.vehicles)),
+    )
+    return np.array(features).astype(np.float32)
+
+
 def _view(
     charge: Charge, walls: WallPoints, boxes_m: FloatArray, height_m: FloatArray, flat: BoolArray
 ) -> _View:
     """Return the candidates as seen from a place of the charge."""
-    # 1. The walls that the charge faces, weighted by area, slant and distance.
+    # 1. The walls that the charge faces.
     from_m = np.array(charge.position_m)
-    way_m = walls.points_m[:, :2] - from_m
-    far_m = np.maximum(np.hypot(way_m[:, 0], way_m[:, 1]), _LEAST_M)
-    facing = -(way_m * walls.outward).sum(axis=1) / far_m
-    weight = walls.area_m2 * np.maximum(facing, 0.02) / far_m
-    weight = weight / weight.sum()
-    towards_m = weight @ way_m
-    distance_m = max(float(np.hypot(*towards_m)), _LEAST_M)
-    ahead = towards_m / distance_m
-    faced = facing > 0.0 if bool(np.any(facing > 0.0)) else np.ones(len(facing), dtype=bool)
-    wall_m = float((walls.points_m[:, 2] + walls.to_roof_m)[faced].max())
-    angle = np.arctan2(way_m[:, 1] * ahead[0] - way_m[:, 0] * ahead[1], way_m @ ahead)
-    half_angle = max(float(np.abs(angle[faced]).max()), 0.05)
-    bin_of = np.clip((angle / half_angle + 1.0) / 2.0 * BEARINGS, 0, BEARINGS - 1).astype(np.int64)
-    counted = np.bincount(bin_of, weight * faced, BEARINGS)
-    shares: FloatArray = counted / counted.sum()
+    faced = _FacedWalls.from_charge(from_m, walls)
+    ahead, distance_m, half_angle = faced.ahead, faced.distance_m, faced.half_angle
     # 2. The candidates along and aside of the line, and the bearings that they hide.
     half_m = (boxes_m[:, 2:] - boxes_m[:, :2]) / 2.0
     centre_m = boxes_m[:, :2] + half_m - from_m
@@ -274,16 +329,14 @@ def _view(
     )
     before = (along_m > 0.0) & (along_m < distance_m) & ~flat
     first, last = np.where(before, first, 0), np.where(before, last, 0)
-    up_to = np.append(0.0, np.cumsum(shares))
+    up_to = np.append(0.0, np.cumsum(faced.shares))
     cut = up_to[last] - up_to[first]
     # 3. How high the shadow is on the walls, and the way over the top.
-    start_m = charge.height_m
+    start_m, wall_m = charge.height_m, faced.height_m
     shadow_m = start_m + (height_m - start_m) * distance_m / np.maximum(along_m, _LEAST_M)
     hidden = np.where(before, np.clip(shadow_m / wall_m, 0.0, 1.0), 0.0)
     scale_m = float(np.cbrt(charge.tnt_kg))
-    there_m = np.clip(along_m, 0.0, distance_m)
-    rise_m = np.maximum(height_m - (start_m + there_m / distance_m * (wall_m / 2.0 - start_m)), 0.0)
-    over_m = np.hypot(there_m, rise_m) + np.hypot(distance_m - there_m, rise_m) - distance_m
+    over_m = _way_over_m(height_m, along_m, distance_m, start_m, wall_m / 2.0)
     to_walls_m = np.maximum(distance_m - along_m, _LEAST_M)
     columns = np.column_stack(
         (
@@ -310,12 +363,18 @@ def _view(
         first=first,
         last=last,
         hidden=hidden,
-        shares=shares,
-        distance_m=distance_m,
-        half_angle=half_angle,
-        wall_m=wall_m,
+        faced=faced,
         scale_m=scale_m,
     )
+
+
+def _way_over_m(
+    height_m: FloatArray, along_m: FloatArray, distance_m: float, start_m: float, end_m: float
+) -> FloatArray:
+    """Return by how much the way over the top is longer than the straight one, between heights."""
+    there_m = np.clip(along_m, 0.0, distance_m)
+    rise_m = np.maximum(height_m - (start_m + there_m / distance_m * (end_m - start_m)), 0.0)
+    return np.hypot(there_m, rise_m) + np.hypot(distance_m - there_m, rise_m) - distance_m
 
 
 def _by_rule(scenario: Scenario, charge: AnyCharge | None) -> tuple[Layout, Layout]:
