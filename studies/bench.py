@@ -474,6 +474,15 @@ def _print_ratios(older: Path, names: Sequence[str], turns: int) -> None:
     print_table(title, ("work", "unit", "older", "this one", "ratio", "of the turns"), rows, 2)
 
 
+_AgainstOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Only the ratios of costs to those of an older checkout in this folder, measured "
+        "in turns: above 1 this one is faster."
+    ),
+]
+
+
 def main(
     scenario: Annotated[
         list[str] | None, typer.Option(help="A scenario, else courtyard. May be repeated.")
@@ -502,13 +511,7 @@ def main(
         list[float] | None,
         typer.Option(help="With --site large: 20 to 200 m, else 20, 50 and 100. May be repeated."),
     ] = None,
-    against: Annotated[
-        Path | None,
-        typer.Option(
-            help="Only the ratios of costs to those of an older checkout in this folder, measured "
-            "in turns: above 1 this one is faster."
-        ),
-    ] = None,
+    against: _AgainstOption = None,
     row: Annotated[
         list[str] | None,
         typer.Option(help=f"With --against: {', '.join(ROWS)}, else all. May be repeated."),
@@ -525,24 +528,28 @@ def main(
         if against is not None:
             print_line(hardware())
             _print_ratios(against, row or (), repeats)
-            return
-        if site:
+        elif site:
             sites = list(_sites(site, length or ()))
             print_line(hardware())
             _print_sites(sites, cells or ())
-            return
-        scenarios = [load_scenario(name) for name in scenario or ("courtyard",)]
-        engines = [find_engine(engine_name).name for engine_name in engine or ENGINE_NAMES]
-        print_line(hardware())
-        pairs = [(scenario, name) for scenario in scenarios for name in engines]
-        costs: list[BlastCost] = []
-        with progress_bar("blasts") as progress:
-            for item, name in (pair for pair in pairs if find_engine(pair[1]).medium):
-                costs.append(blast_cost(item, name, repeats, memory=memory))
-                progress(len(costs) / len(pairs))
-        _print_blasts(costs, repeats)
-        if environment:
-            _print_environments(pairs, repeats, environments, memory=memory)
+        else:
+            scenarios = [load_scenario(name) for name in scenario or ("courtyard",)]
+            engines = [find_engine(name).name for name in engine or ENGINE_NAMES]
+            print_line(hardware())
+            pairs = [(own, name) for own in scenarios for name in engines]
+            _print_blasts(_costs(pairs, repeats, memory=memory), repeats)
+            if environment:
+                _print_environments(pairs, repeats, environments, memory=memory)
+
+
+def _costs(pairs: Sequence[tuple[Scenario, str]], repeats: int, *, memory: bool) -> list[BlastCost]:
+    """Measure the blasts of each scenario and engine that has a medium."""
+    costs: list[BlastCost] = []
+    with progress_bar("blasts") as progress:
+        for item, name in (pair for pair in pairs if find_engine(pair[1]).medium):
+            costs.append(blast_cost(item, name, repeats, memory=memory))
+            progress(len(costs) / len(pairs))
+    return costs
 
 
 if __name__ == "__main__":

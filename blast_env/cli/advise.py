@@ -1,8 +1,11 @@
 """`blast-env advise`: the protection for a budget by kind of measure, and the cost to pass."""
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -42,34 +45,42 @@ from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import load_scenario
 
+_BudgetCostOption = Annotated[
+    float | None, typer.Option(help="Most that may be spent; else the zone's budget.")
+]
+_TargetProbabilityOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Least probability of the level; else the scenario's, else none.", min=0.5, max=0.999
+    ),
+]
+_CellsOption = Annotated[
+    str | None,
+    typer.Option(help=CELLS_HELP, show_default="coarse on sites wider than 40 m, else uniform"),
+]
+_JudgeCellOption = Annotated[
+    float | None,
+    typer.Option(
+        "--judge-cell",
+        help="Side of the cells for judging the layouts found, m.",
+        show_default=FINAL_CELLS,
+    ),
+]
+
 
 def advise(
     scenario: ScenarioArgument,
-    budget_cost: float | None = typer.Option(
-        None, help="Most that may be spent; else the zone's budget."
-    ),
+    budget_cost: _BudgetCostOption = None,
     target: str | None = typer.Option(None, help=TARGET_HELP.format("medium")),
-    target_probability: float | None = typer.Option(
-        None,
-        help="Least probability of the level; else the scenario's, else none.",
-        min=0.5,
-        max=0.999,
-    ),
+    target_probability: _TargetProbabilityOption = None,
     mass_error: MassErrorOption = 0.1,
     charges: DrawsOption = 16,
     budget: int = typer.Option(60, help="Most blasts of a search.", min=1),
     rounds: int = typer.Option(ROUNDS, help="Most searches for each kind.", min=1),
     seed: int = typer.Option(0, help="Seed of the draws.", min=0),
     cell_m: CellOption = None,
-    cells: str | None = typer.Option(
-        None, help=CELLS_HELP, show_default="coarse on sites wider than 40 m, else uniform"
-    ),
-    judge_cell_m: float | None = typer.Option(
-        None,
-        "--judge-cell",
-        help="Side of the cells for judging the layouts found, m.",
-        show_default=FINAL_CELLS,
-    ),
+    cells: _CellsOption = None,
+    judge_cell_m: _JudgeCellOption = None,
     out: Path | None = writes("Layout file of the best layout of all", ".json"),
     picture: Path | None = writes("Picture of cost against level of protection", *PICTURES),
     charge: ChargeOption = None,
@@ -97,7 +108,22 @@ def advise(
     judge = final_engine(JUDGE, [site], judge_cell_m)
     evaluator = BlastEvaluator(site, engine, cache=cache)
     problem = DesignProblem(evaluator, LoadCaseSet(site, threats), processes)
-    kinds = kinds_for(site)
+    judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
+    with resumable(resume_words(cache)), _running(judging, rounds, budget) as progress:
+        found = advised(judging, budget, rounds, seed, progress)
+    print_parts(advice_answer(found))
+    made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
+    written = [] if out is None else [write_layout(out, site, found.best.layout, made)]
+    print_written([*written, *save_figures((picture, partial(advice_figure, found)))])
+
+
+def _running(
+    judging: AdviceJudge, rounds: int, budget: int
+) -> AbstractContextManager[Callable[..., None]]:
+    """Say what will run at most, and show the progress."""
+    site, problem = judging.scenario, judging.problem
+    kinds, threats = kinds_for(site), problem.threats
+    engine, judge = problem.evaluator.engine, judging.engine
     words = (
         f"{len(kinds)} kinds, at most {rounds} searches of {budget} blasts each, {engine.words}; "
         f"each result is judged with {len(threats)}, {judge.words}"
@@ -107,11 +133,4 @@ def advise(
         [own.cost(site, threat.charge) for threat in threats] for own in (engine, judge)
     )
     costs = [*islice(cycle(coarse), blasts), *fine * barriers]
-    judging = AdviceJudge(problem, BlastEvaluator(site, judge, cache=cache), mass_error)
-    label = f"{len(kinds)} kinds"
-    with resumable(resume_words(cache)), blasts_running(label, words, costs) as progress:
-        found = advised(judging, budget, rounds, seed, progress)
-    print_parts(advice_answer(found))
-    made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
-    written = [] if out is None else [write_layout(out, site, found.best.layout, made)]
-    print_written([*written, *save_figures((picture, partial(advice_figure, found)))])
+    return blasts_running(f"{len(kinds)} kinds", words, costs)

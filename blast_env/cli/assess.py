@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -83,33 +83,57 @@ _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg
 _OF_ASSESSMENT: Final = ("without_fallen", "diagram", "table")
 _NOT_OF_CAPACITY: Final = (*_OF_ASSESSMENT, "require", "target", "mass_error", "picture")
 
+_ScreenOption = Annotated[
+    bool,
+    typer.Option(
+        "--screen",
+        help="Print only level of protection and stand-offs by the curves in the open, in "
+        "seconds, without a blast.",
+    ),
+]
+_CapacityOption = Annotated[
+    bool,
+    typer.Option(
+        "--capacity",
+        help="Print only the largest charge at each place, and the least stand-off, that keep "
+        "each level.",
+    ),
+]
+_WithoutFallenOption = Annotated[
+    bool,
+    typer.Option(
+        "--without-fallen",
+        help="Remove pieces that overturn before the blast is over, and run it again.",
+    ),
+]
+_GasOption = Annotated[
+    bool,
+    typer.Option(
+        "--gas", help="Gas dynamics of each worst place, for comparison.", rich_help_panel=_SCREEN
+    ),
+]
+_ShieldingOption = Annotated[
+    bool,
+    typer.Option(
+        "--shielding/--no-shielding",
+        help="Change loads by what stands around, by the atlas of shielding.",
+        rich_help_panel=_SCREEN,
+    ),
+]
+
 
 def assess(
     context: typer.Context,
     scenario: ScenarioArgument,
     layout: LayoutOption = None,
-    screen: bool = typer.Option(
-        False,
-        "--screen",
-        help="Print only level of protection and stand-offs by the curves in the open, in "
-        "seconds, without a blast.",
-    ),
-    capacity: bool = typer.Option(
-        False,
-        "--capacity",
-        help="Print only the largest charge at each place, and the least stand-off, that keep "
-        "each level.",
-    ),
+    screen: _ScreenOption = False,
+    capacity: _CapacityOption = False,
     target: TargetOption = None,
     charges: DrawsOption = 16,
     cell_m: FinalCellOption = None,
     cells: FinalCellsOption = None,
     mass_error: MassErrorOption = 0.1,
-    without_fallen: bool = typer.Option(
-        False,
-        "--without-fallen",
-        help="Remove pieces that overturn before the blast is over, and run it again.",
-    ),
+    without_fallen: _WithoutFallenOption = False,
     require: RequireOption = None,
     glazing: GlazingOption = None,
     wall: WallOption = None,
@@ -127,18 +151,8 @@ def assess(
         help=_MASS_HELP,
         rich_help_panel=_SCREEN,
     ),
-    gas: bool = typer.Option(
-        False,
-        "--gas",
-        help="Gas dynamics of each worst place, for comparison.",
-        rich_help_panel=_SCREEN,
-    ),
-    shielding: bool = typer.Option(
-        True,
-        "--shielding/--no-shielding",
-        help="Change loads by what stands around, by the atlas of shielding.",
-        rich_help_panel=_SCREEN,
-    ),
+    gas: _GasOption = False,
+    shielding: _ShieldingOption = True,
 ) -> None:
     """Assess the damage of buildings by charges: panes, panels, level of protection.
 
@@ -169,19 +183,16 @@ def assess(
     threats = ChargeInput.of(charge, tnt_kg).threats(site, charges)
     campaign = Campaign.on(site, layouts, threats, engine, engine.coarser, cache)
     level = wanted_level(target, site, LevelOfProtection.LOW)
+    if capacity:
+        refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
     with resumable(resume_words(cache)):
         if capacity:
-            refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
             _capacity(campaign)
             return
         check_facades(site, engine)
         found = _damage(replace(campaign, without_fallen=without_fallen))
         print_parts(assessment(*found, level, mass_error, required))
-    _, consequences = found
-    written = [] if table is None else [write_csv(bay_table(consequences), table)]
-    drawings = (picture, facade_figure), (diagram, pressure_impulse_figure)
-    figures = ((path, partial(draw, site, consequences)) for path, draw in drawings)
-    print_written([*written, *save_figures(*figures)])
+    _write(site, found[1], picture, diagram, table)
 
 
 def _damage(campaign: Campaign) -> tuple[Blasts, dict[str, Consequences]]:
@@ -191,6 +202,20 @@ def _damage(campaign: Campaign) -> tuple[Blasts, dict[str, Consequences]]:
     with blasts_running(label, words, campaign.cost()) as progress:
         blasts = campaign.run(progress, worst=governing)
     return blasts, consequences_by_layout(blasts)
+
+
+def _write(
+    site: Scenario,
+    consequences: dict[str, Consequences],
+    picture: Path | None,
+    diagram: Path | None,
+    table: Path | None,
+) -> None:
+    """Write the table and the pictures of the command line."""
+    written = [] if table is None else [write_csv(bay_table(consequences), table)]
+    drawings = (picture, facade_figure), (diagram, pressure_impulse_figure)
+    figures = ((path, partial(draw, site, consequences)) for path, draw in drawings)
+    print_written([*written, *save_figures(*figures)])
 
 
 def _capacity(campaign: Campaign) -> None:

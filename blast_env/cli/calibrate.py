@@ -82,15 +82,9 @@ def calibrate(
     tnt_range_kg = _parse_range(tnt_range)
     make_folder(out)
     used = find_engine(engine)
-    site = load_scenario(scenario).with_simulation(preset)
-    if tnt_kg is not None:
-        document = site.model_dump()
-        for source in document["charge"]:
-            source["tnt_kg"] = tnt_kg
-        site = Scenario.from_document(document, f"{scenario} with --tnt-kg")
-    study = FreeFieldStudy(
-        site, distances_m, tuple(range(first_seed, first_seed + seeds)), used.name
-    )
+    site = _site(scenario, preset, tnt_kg)
+    drawn = tuple(range(first_seed, first_seed + seeds))
+    study = FreeFieldStudy(site, distances_m, drawn, used.name)
     compared = _reference(reference, study)
     stem = str(out / f"{name}.{engine}")
     kept = Path(f"{stem}.runs.sqlite")
@@ -103,6 +97,17 @@ def calibrate(
     written = _write(report, stored, stem)
     print_line(used.describe([study.scenario]))
     print_outcome(calibration_answer(report, stored), [*written, kept])
+
+
+def _site(name: str, preset: str | None, tnt_kg: float | None) -> Scenario:
+    """Return the scenario with the parameters and the mass of the command line."""
+    site = load_scenario(name).with_simulation(preset)
+    if tnt_kg is None:
+        return site
+    document = site.model_dump()
+    for source in document["charge"]:
+        source["tnt_kg"] = tnt_kg
+    return Scenario.from_document(document, f"{name} with --tnt-kg")
 
 
 def _parse_numbers(option: str, text: str) -> tuple[float, ...]:

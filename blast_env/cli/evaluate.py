@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -61,25 +61,35 @@ def _note_export(context: typer.Context, value: Path | None) -> Path | None:
     return value
 
 
-def evaluate(
-    layout: Path = typer.Option(help="JSON file of the (row, column) cells."),
-    scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
-    seeds: int = typer.Option(32, help="Number of threats.", min=1),
-    first_seed: int | None = typer.Option(
-        None, help="First seed.", min=0, show_default="the first one outside training and search"
+_FirstSeedOption = Annotated[
+    int | None,
+    typer.Option(
+        help="First seed.", min=0, show_default="the first one outside training and search"
     ),
-    engine: EngineChoice = JUDGE,
-    cell_m: FinalCellOption = None,
-    cells: FinalCellsOption = None,
-    cvar_level: float = typer.Option(
-        CVAR_LEVEL, help="Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
-    ),
-    export: Path | None = typer.Option(
-        None,
+]
+_CvarLevelOption = Annotated[
+    float, typer.Option(help="Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads.")
+]
+_ExportOption = Annotated[
+    Path | None,
+    typer.Option(
         help="Folder for the layout as JSON, CSV, GeoJSON, DXF and glTF; or a file with one of "
         "their suffixes, or .ifc.",
         callback=_note_export,
     ),
+]
+
+
+def evaluate(
+    layout: Path = typer.Option(help="JSON file of the (row, column) cells."),
+    scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
+    seeds: int = typer.Option(32, help="Number of threats.", min=1),
+    first_seed: _FirstSeedOption = None,
+    engine: EngineChoice = JUDGE,
+    cell_m: FinalCellOption = None,
+    cells: FinalCellsOption = None,
+    cvar_level: _CvarLevelOption = CVAR_LEVEL,
+    export: _ExportOption = None,
     out: Path | None = writes("Folder for the JSON file, the tables and the figure"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,

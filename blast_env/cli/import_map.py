@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -24,6 +24,89 @@ _PLACE: Final = (
     "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
 )
 
+_OriginOption = Annotated[
+    str | None, typer.Option(help=f"The site's lower left corner. {_PLACE}", metavar="X,Y")
+]
+_CentreOption = Annotated[
+    str | None, typer.Option(help="The site's middle, instead of --origin.", metavar="X,Y")
+]
+_SizeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--size",
+        help="The site's extents, m.",
+        metavar="WIDTH,HEIGHT",
+        show_default="as much as everything in the file needs",
+    ),
+]
+_MarginOption = Annotated[
+    float | None,
+    typer.Option(
+        "--margin",
+        help="Ground around everything without --size, m.",
+        show_default=f"{MARGIN_M:g}, or to a street within {MOST_MARGIN_M:g}",
+    ),
+]
+_RotationOption = Annotated[
+    float | None,
+    typer.Option(
+        "--rotation",
+        help="Direction of the site's x axis, degrees from east, counterclockwise.",
+        show_default="that of most walls",
+    ),
+]
+_CrsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Reference system of the coordinates: EPSG:25832, or local for plain metres.",
+        show_default="that of the GeoJSON file, else EPSG:4326; none for DXF",
+    ),
+]
+_ProtectNearOption = Annotated[
+    str | None, typer.Option(help="Protect the building nearest to this.", metavar="X,Y")
+]
+_TntKgOption = Annotated[
+    float, typer.Option("--tnt-kg", help="Mass of the charges, kg TNT.", metavar="KG")
+]
+_ZoneOption = Annotated[
+    str | None,
+    typer.Option("--zone", help="The build zone, site metres.", metavar="LEFT,BOTTOM,WIDTH,HEIGHT"),
+]
+_ZoneAroundOption = Annotated[
+    float | None,
+    typer.Option("--zone-around", help="Width of a zone around the protected buildings, m."),
+]
+_HeightUnitOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of heights, widths and diameters without one: m, mm, cm, dm, km, in, ft.",
+        show_default="m; ft, as a guess, if the coordinates are in feet",
+    ),
+]
+_DefaultHeightOption = Annotated[
+    float | None,
+    typer.Option(
+        "--default-height",
+        help="Height of buildings without one, m.",
+        show_default="guessed from neighbours and kind",
+    ),
+]
+_LowHeightsOption = Annotated[
+    bool,
+    typer.Option(
+        "--low-heights", help="Take the low guess of heights that the file does not have."
+    ),
+]
+_LeastAreaOption = Annotated[
+    float, typer.Option("--least-area", help="Leave out smaller buildings, m2.")
+]
+_RepairOption = Annotated[
+    bool, typer.Option("--repair", help="Put outlines right that cross themselves.")
+]
+_StrictOption = Annotated[
+    bool, typer.Option("--strict", help="Refuse a file where anything was guessed or left out.")
+]
+
 
 def import_map(
     context: typer.Context,
@@ -35,36 +118,12 @@ def import_map(
     ),
     as_json: bool = typer.Option(False, "--json", help="Print the report as JSON."),
     name: str | None = typer.Option(None, help="Name of the scenario."),
-    origin: str | None = typer.Option(
-        None, help=f"The site's lower left corner. {_PLACE}", metavar="X,Y"
-    ),
-    centre: str | None = typer.Option(
-        None, help="The site's middle, instead of --origin.", metavar="X,Y"
-    ),
-    size_m: str | None = typer.Option(
-        None,
-        "--size",
-        help="The site's extents, m.",
-        metavar="WIDTH,HEIGHT",
-        show_default="as much as everything in the file needs",
-    ),
-    margin_m: float | None = typer.Option(
-        None,
-        "--margin",
-        help="Ground around everything without --size, m.",
-        show_default=f"{MARGIN_M:g}, or to a street within {MOST_MARGIN_M:g}",
-    ),
-    rotation_deg: float | None = typer.Option(
-        None,
-        "--rotation",
-        help="Direction of the site's x axis, degrees from east, counterclockwise.",
-        show_default="that of most walls",
-    ),
-    crs: str | None = typer.Option(
-        None,
-        help="Reference system of the coordinates: EPSG:25832, or local for plain metres.",
-        show_default="that of the GeoJSON file, else EPSG:4326; none for DXF",
-    ),
+    origin: _OriginOption = None,
+    centre: _CentreOption = None,
+    size_m: _SizeOption = None,
+    margin_m: _MarginOption = None,
+    rotation_deg: _RotationOption = None,
+    crs: _CrsOption = None,
     units: str | None = typer.Option(None, help="Unit of a drawing: m, mm, cm, dm, km, in, ft."),
     buildings_from: list[str] = typer.Option(
         [], help="Features that are buildings: KEY, KEY=VALUE, or a layer of a drawing."
@@ -81,60 +140,28 @@ def import_map(
         [], help="Areas to be kept empty, named in the same way."
     ),
     protect: list[str] = typer.Option([], help="Name of a building whose load counts."),
-    protect_near: str | None = typer.Option(
-        None, help="Protect the building nearest to this.", metavar="X,Y"
-    ),
-    tnt_kg: float = typer.Option(
-        100.0, "--tnt-kg", help="Mass of the charges, kg TNT.", metavar="KG"
-    ),
+    protect_near: _ProtectNearOption = None,
+    tnt_kg: _TntKgOption = 100.0,
     charge_at: list[str] = typer.Option([], help="A further place of a charge.", metavar="X,Y"),
-    zone_m: str | None = typer.Option(
-        None, "--zone", help="The build zone, site metres.", metavar="LEFT,BOTTOM,WIDTH,HEIGHT"
-    ),
-    zone_around_m: float | None = typer.Option(
-        None, "--zone-around", help="Width of a zone around the protected buildings, m."
-    ),
+    zone_m: _ZoneOption = None,
+    zone_around_m: _ZoneAroundOption = None,
     glazing: GlazingOption = None,
     wall: WallOption = None,
     height_from: str | None = typer.Option(None, help="Property with the height."),
-    height_unit: str | None = typer.Option(
-        None,
-        help="Unit of heights, widths and diameters without one: m, mm, cm, dm, km, in, ft.",
-        show_default="m; ft, as a guess, if the coordinates are in feet",
-    ),
-    default_height_m: float | None = typer.Option(
-        None,
-        "--default-height",
-        help="Height of buildings without one, m.",
-        show_default="guessed from neighbours and kind",
-    ),
-    low_heights: bool = typer.Option(
-        False,
-        "--low-heights",
-        help="Take the low guess of heights that the file does not have.",
-    ),
+    height_unit: _HeightUnitOption = None,
+    default_height_m: _DefaultHeightOption = None,
+    low_heights: _LowHeightsOption = False,
     level_height_m: float = typer.Option(3.0, "--level-height", help="Height of a storey, m."),
-    least_area_m2: float = typer.Option(
-        4.0, "--least-area", help="Leave out smaller buildings, m2."
-    ),
-    repair: bool = typer.Option(
-        False, "--repair", help="Put outlines right that cross themselves."
-    ),
-    strict: bool = typer.Option(
-        False, "--strict", help="Refuse a file where anything was guessed or left out."
-    ),
+    least_area_m2: _LeastAreaOption = 4.0,
+    repair: _RepairOption = False,
+    strict: _StrictOption = False,
 ) -> None:
     """Make a scenario from a map, drawing or model: GeoJSON, IFC and others.
 
     The site is turned to the direction of most walls, and buildings are polygons; the table gives
     the deviation of the modules of each building from its outline.
     """
-    # Here, because maps need the extra `maps`.
-    with Interruptions.current().at_once():
-        from blast_env.io.importing import import_site
-
-    imported = import_site(file, _options(context))
-    imported = replace(imported, scenario=imported.scenario.with_facades(glazing, wall))
+    imported = _imported(file, _options(context), glazing, wall)
     save_scenario(imported.scenario, out)
     written = [out, *save_pictures((picture, partial(_plan, imported)))]
     if ledger is not None:
@@ -143,6 +170,18 @@ def import_map(
         print_record(imported.record, written)
     else:
         print_outcome(import_answer(imported), written)
+
+
+def _imported(
+    file: Path, options: ImportOptions, glazing: str | None, wall: str | None
+) -> "SiteImport":
+    """Import the site; protected structures without a facade get the given one."""
+    # Here, because maps need the extra `maps`.
+    with Interruptions.current().at_once():
+        from blast_env.io.importing import import_site
+
+    imported = import_site(file, options)
+    return replace(imported, scenario=imported.scenario.with_facades(glazing, wall))
 
 
 def _options(context: typer.Context) -> ImportOptions:

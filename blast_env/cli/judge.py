@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import count
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import typer
 
@@ -45,6 +45,34 @@ from blast_env.files import make_folder, write_text
 _KEPT: Final = 4096
 _NO_STANDINGS: Final = (Line.of("no submissions come with the package"),)
 
+_ScenarioOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Your own site in the place of problems: a file, a bundled name, or for generated "
+        "ones sites, item_sites, large_sites, kerb_sites or street_sites; may be given again.",
+    ),
+]
+_ThreatOption = Annotated[
+    str,
+    typer.Option(
+        help="Of --scenario. visible: a problem for each charge. hidden: one for all charges."
+    ),
+]
+_CasesOption = Annotated[
+    int,
+    typer.Option(help="Most visible charges of a --scenario, or how many generated sites.", min=1),
+]
+_SeedsOption = Annotated[
+    int, typer.Option(help="Runs of a method for each problem and budget above 0.", min=1)
+]
+_SecretOption = Annotated[
+    str | None,
+    typer.Option(help="Judge the methods on generated sites that only this text can draw."),
+]
+_SearchCellOption = Annotated[
+    float, typer.Option("--search-cell", help="Side of the cells for the methods, m.")
+]
+
 
 def judge(
     submissions: list[Path] = typer.Argument(
@@ -61,32 +89,17 @@ def judge(
     problem: list[str] = typer.Option(
         [], help="Problem for the methods; may be given again; else all."
     ),
-    scenario: list[str] = typer.Option(
-        [],
-        help="Your own site in the place of problems: a file, a bundled name, or for generated "
-        "ones sites, item_sites, large_sites, kerb_sites or street_sites; may be given again.",
-    ),
-    threat: str = typer.Option(
-        "visible",
-        help="Of --scenario. visible: a problem for each charge. hidden: one for all charges.",
-    ),
-    cases: int = typer.Option(
-        16, help="Most visible charges of a --scenario, or how many generated sites.", min=1
-    ),
+    scenario: _ScenarioOption = None,
+    threat: _ThreatOption = "visible",
+    cases: _CasesOption = 16,
     budget: list[int] = typer.Option(
         [],
         help="Blasts of a method; may be given again; else 50, and 0 for those that need none.",
     ),
-    seeds: int = typer.Option(
-        1, help="Runs of a method for each problem and budget above 0.", min=1
-    ),
-    secret: str | None = typer.Option(
-        None, help="Judge the methods on generated sites that only this text can draw."
-    ),
+    seeds: _SeedsOption = 1,
+    secret: _SecretOption = None,
     sites: int = typer.Option(8, help="How many sites --secret draws.", min=1),
-    search_cell_m: float = typer.Option(
-        0.5, "--search-cell", help="Side of the cells for the methods, m."
-    ),
+    search_cell_m: _SearchCellOption = 0.5,
     cell_m: float = typer.Option(JUDGE_CELL_M, "--cell", help="Side of the judge's cells, m."),
     out: Path | None = writes("Folder for the submissions of methods and for the judged ones"),
     page: Path | None = writes("Write the standings as a page", ".md"),
@@ -99,20 +112,20 @@ def judge(
     the package. With --method or --run, it first runs methods and writes their submissions, with
     --scenario on your own sites.
     """
-    find_engine(JUDGE, cell_m)  # refuses unusable cells before methods run
-    plays, resume = bool(method or run), resume_words(cache)
+    judging = _Judging(cell_m, search_cell_m, range(seeds), processes, cache, out)
+    plays = bool(method or run)
     if not plays and (secret is not None or scenario):
         raise BlastEnvError("--secret and --scenario need a --method or a --run to judge")
+    resume = resume_words(cache)
     if plays and out is not None:
         resume = f"the same command resumes after the completed runs; {resume}"
-    judging = _Judging(cell_m, search_cell_m, range(seeds), processes, cache, out)
     with resumable(resume):
         if out is not None:
             make_folder(out)
         submitted = [read_submission(path) for path in submissions]
         judged = [judging.judged(item, DEFINITIONS, stored_references()) for item in submitted]
         if plays:
-            definitions = _definitions(problem, secret, sites, scenario, threat, cases)
+            definitions = _definitions(problem, secret, sites, scenario or (), threat, cases)
             played = [
                 judging.played(*item, definitions)
                 for item in _methods(method, run, budget, definitions)
@@ -183,6 +196,9 @@ class _Judging:
     processes: int
     cache: Path | None
     out: Path | None
+
+    def __post_init__(self) -> None:
+        find_engine(JUDGE, self.cell_m)  # refuses unusable cells before methods run
 
     def played(
         self,

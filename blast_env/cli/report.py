@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -36,6 +36,20 @@ from blast_env.values import plain_number
 if TYPE_CHECKING:
     from blast_env.answers.report import StudyOptions
 
+_CellsOption = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        help="Sides of the cells of gas dynamics, m, or coarse fine, which grow; the same twice is "
+        "one size, without a grid error.",
+        metavar="COARSE FINE",
+        show_default="0.5 0.25; coarse fine on sites wider than 40 m",
+    ),
+]
+_DetailsOption = Annotated[
+    Path | None,
+    typer.Option(help="TOML file with project, client, author, checker, revision and marking."),
+]
+
 
 def report(
     context: typer.Context,
@@ -51,13 +65,7 @@ def report(
         show_default="of each charge source the worst of its places with the layout",
     ),
     most_threats: int = typer.Option(2, "--threats", help="How many of those, 1 to 6."),
-    cells: tuple[str, str] | None = typer.Option(
-        None,
-        help="Sides of the cells of gas dynamics, m, or coarse fine, which grow; the same twice is "
-        "one size, without a grid error.",
-        metavar="COARSE FINE",
-        show_default="0.5 0.25; coarse fine on sites wider than 40 m",
-    ),
+    cells: _CellsOption = None,
     limits: list[str] = typer.Option(
         [],
         "--limit",
@@ -68,9 +76,7 @@ def report(
     places: int = typer.Option(5, help="Other places of each charge source."),
     items: bool = typer.Option(True, help="Rank the contribution of each module or piece."),
     mass_error: MassErrorOption = 0.1,
-    details: Path | None = typer.Option(
-        None, help="TOML file with project, client, author, checker, revision and marking."
-    ),
+    details: _DetailsOption = None,
     processes: ProcessesOption = 1,
     cache: CacheOption = None,
 ) -> None:

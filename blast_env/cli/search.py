@@ -6,7 +6,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
 import typer
@@ -110,57 +110,71 @@ _OF_OTHER_THREAT: Final = MappingProxyType(
 )
 """Options that do not apply to a threat, and why."""
 
-
-def search(
-    context: typer.Context,
-    method: str = typer.Option("genetic", help=_METHOD_HELP),
-    scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
-    budget: int | None = typer.Option(
-        None,
-        help="Most blasts that may be spent.",
-        show_default=f"{DEFAULT_BUDGET}",
-        min=1,
+_BudgetOption = Annotated[
+    int | None,
+    typer.Option(help="Most blasts that may be spent.", show_default=f"{DEFAULT_BUDGET}", min=1),
+]
+_ThreatOption = Annotated[
+    ThreatName,
+    typer.Option(help="visible: one known charge; hidden: a layout for all possible charges."),
+]
+_RiskOption = Annotated[
+    str | None,
+    typer.Option(
+        help="mean, cvar or worst, over the charges.", show_default="as in the scenario's objective"
     ),
-    seed: int = typer.Option(0, help="Decides threats and search.", min=0),
-    threat: ThreatName = typer.Option(
-        "visible", help="visible: one known charge; hidden: a layout for all possible charges."
-    ),
-    threats: int = typer.Option(16, help="Charges of a hidden threat.", min=1),
-    risk: str | None = typer.Option(
-        None,
-        help="mean, cvar or worst, over the charges.",
-        show_default="as in the scenario's objective",
-    ),
-    engine: EngineChoice = JUDGE,
-    cell_m: CellOption = None,
-    cells: CellsOption = None,
-    start_from: list[Path] = typer.Option([], help="Initial layout file; may be given again."),
-    surrogate: Path | None = typer.Option(
-        None,
+]
+_SurrogateOption = Annotated[
+    Path | None,
+    typer.Option(
         help="File of the surrogate for --method surrogate (studies.surrogate fit).",
         show_default="the package's",
     ),
-    held_out: int = typer.Option(
-        32, help="Number of threats for the final check of the result.", min=1
-    ),
-    verify: bool = typer.Option(
-        False,
+]
+_HeldOutOption = Annotated[
+    int, typer.Option(help="Number of threats for the final check of the result.", min=1)
+]
+_VerifyOption = Annotated[
+    bool,
+    typer.Option(
         "--verify",
         help="With --method package or agent: compare the proposal by gas dynamics with no barrier "
         "and the rules.",
     ),
-    out: Path | None = writes("Folder for layout, its plan, history, front and figure"),
-    charge: ChargeOption = None,
-    tnt_kg: TntOption = None,
-    processes: ProcessesOption = 1,
-    cluster: ClusterAddress = None,
-    width: int | None = typer.Option(
-        None,
+]
+_WidthOption = Annotated[
+    int | None,
+    typer.Option(
         help="Blasts that run at the same time, for the walkers of population_annealing. The "
         "layout depends on it.",
         show_default="the threads of the cluster, else 1",
         min=1,
     ),
+]
+
+
+def search(
+    context: typer.Context,
+    method: str = typer.Option("genetic", help=_METHOD_HELP),
+    scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
+    budget: _BudgetOption = None,
+    seed: int = typer.Option(0, help="Decides threats and search.", min=0),
+    threat: _ThreatOption = "visible",
+    threats: int = typer.Option(16, help="Charges of a hidden threat.", min=1),
+    risk: _RiskOption = None,
+    engine: EngineChoice = JUDGE,
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
+    start_from: list[Path] = typer.Option([], help="Initial layout file; may be given again."),
+    surrogate: _SurrogateOption = None,
+    held_out: _HeldOutOption = 32,
+    verify: _VerifyOption = False,
+    out: Path | None = writes("Folder for layout, its plan, history, front and figure"),
+    charge: ChargeOption = None,
+    tnt_kg: TntOption = None,
+    processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
+    width: _WidthOption = None,
     cache: CacheOption = None,
 ) -> None:
     """Search for the layout with the least load on the protected structures.
@@ -174,26 +188,19 @@ def search(
     the charge.
     """
     given = ChargeInput.of(charge, tnt_kg)
+    _refuse_of_other_methods(context, method, threat, verify=verify)
     if method in _WITHOUT_BLASTS:
-        refuse_given(context, _WITH_BLASTS, f"does not apply to --method {method}")
-        found = _proposal_without_blasts(
-            method, load_scenario(scenario), given, cells, processes, out
-        )
+        site = load_scenario(scenario)
+        proposed = _proposal_without_blasts(method, site, given, cells, processes, out)
         if verify:
-            _verify(*found, cells)
+            _verify(*proposed, cells)
         return
-    if verify:
-        raise BlastEnvError(
-            f"--verify is for --method {' or '.join(_WITHOUT_BLASTS)}, not {method}"
-        )
-    refuse_given(context, *_OF_OTHER_THREAT[threat])
     with running_on(cluster) as threads_now, resumable(resume_words(cache)):
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)
         proposer, digest = _method(method, site, start_from, surrogate)
         own_width = threads_now if width is None else width
-        proposer = widened(proposer, own_width)
         known = None if threat == "hidden" else _known_charge(site, given, seed)
         own_risk = find_risk(risk, CVAR_LEVEL)
         problem = search_problem(
@@ -203,9 +210,8 @@ def search(
             risk=own_risk,
             processes=processes,
         )
+        proposer = widened(proposer, own_width)
         run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
-        if run.result.interrupted and not run.result.history:
-            raise KeyboardInterrupt  # there is no layout to keep
         checked = _check(run, held_out, is_hidden=threat == "hidden")
         print_parts(search_answer(run, checked))
         if out is not None:
@@ -217,6 +223,20 @@ def search(
             "" if out is None else f"--start-from {out / LAYOUT_NAME} begins with it",
             resume_words(cache),
         )
+
+
+def _refuse_of_other_methods(
+    context: typer.Context, method: str, threat: ThreatName, *, verify: bool
+) -> None:
+    """Refuse options that do not apply to the method, or to the threat of a search by blasts."""
+    if method in _WITHOUT_BLASTS:
+        refuse_given(context, _WITH_BLASTS, f"does not apply to --method {method}")
+        return
+    if verify:
+        raise BlastEnvError(
+            f"--verify is for --method {' or '.join(_WITHOUT_BLASTS)}, not {method}"
+        )
+    refuse_given(context, *_OF_OTHER_THREAT[threat])
 
 
 def _known_charge(scenario: Scenario, given: ChargeInput, seed: int) -> AnyCharge:
@@ -268,6 +288,8 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
             progress(state.share, f"{state.blasts} of {budget} blasts{best and f', best {best}'}")
 
         result = method.propose(problem, budget, seed, report)
+    if result.interrupted and not result.history:
+        raise KeyboardInterrupt  # there is no layout to keep
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.counts.cache_hits - hits)
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -30,7 +30,7 @@ from blast_env.io.export import BLAST_SUFFIXES, blast_recorders, check_blast_tar
 from blast_env.layout import load_layout
 from blast_env.layout.build_site import draw_threat
 from blast_env.plots.blast_files import BlastFiles
-from blast_env.site import load_scenario
+from blast_env.site import Scenario, load_scenario
 
 _GAS: Final = "Gas dynamics only"
 _PARTICLES: Final = "Particles only"
@@ -44,15 +44,59 @@ def _note_export(context: typer.Context, value: Path | None) -> Path | None:
     return value
 
 
+_StandOffOption = Annotated[
+    float | None,
+    typer.Option("--stand-off", help="Distance from charge to facade, m (free_field)."),
+]
+_SideBySideOption = Annotated[
+    bool,
+    typer.Option(
+        "--side-by-side", help="Show in all pictures the site without the barrier as well."
+    ),
+]
+_UntilOption = Annotated[
+    str | None, typer.Option(help=UNTIL_HELP, rich_help_panel=_GAS, show_default="structures")
+]
+_ExportOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder for the scene with loads as glTF, the histories as CSV and the field of "
+        "pressure for ParaView; or a file with one of these suffixes: .glb, .csv, .vti.",
+        callback=_note_export,
+        rich_help_panel=_GAS,
+    ),
+]
+_QuantityOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Quantity of --heat-map: impulse or peak.",
+        show_default="impulse",
+        rich_help_panel=_GAS,
+    ),
+]
+_GaugeOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Gauge of --history, beside Kingery-Bulmash.",
+        show_default="the scenario's first",
+        rich_help_panel=_GAS,
+    ),
+]
+_PresetOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Parameters of this name instead of the scenario's.", rich_help_panel=_PARTICLES
+    ),
+]
+
+
 def simulate(
     context: typer.Context,
     scenario: ScenarioArgument,
     layout: LayoutOption = None,
     seed: int = typer.Option(0, help="Decides charge, fan and air.", min=0),
     engine: EngineChoice = JUDGE,
-    stand_off_m: float | None = typer.Option(
-        None, "--stand-off", help="Distance from charge to facade, m (free_field)."
-    ),
+    stand_off_m: _StandOffOption = None,
     film: Path | None = writes("Write a film", ".mp4", ".gif"),
     excel: Path | None = writes("Write a workbook", ".xlsx"),
     heat_map: Path | None = writes(
@@ -61,14 +105,10 @@ def simulate(
     history: Path | None = writes(
         "Write a picture of the load over time (gas: at --gauge)", *PICTURES
     ),
-    side_by_side: bool = typer.Option(
-        False, "--side-by-side", help="Show in all pictures the site without the barrier as well."
-    ),
+    side_by_side: _SideBySideOption = False,
     cell_m: CellOption = None,
     cells: CellsOption = None,
-    until: str | None = typer.Option(
-        None, help=UNTIL_HELP, rich_help_panel=_GAS, show_default="structures"
-    ),
+    until: _UntilOption = None,
     impulse_map: Path | None = writes(
         "Write a map of the impulse over the ground", *PICTURES, panel=_GAS
     ),
@@ -78,30 +118,10 @@ def simulate(
     risk_map: Path | None = writes(
         "Write a map of where windows and eardrums are at risk", *PICTURES, panel=_GAS
     ),
-    export: Path | None = typer.Option(
-        None,
-        help="Folder for the scene with loads as glTF, the histories as CSV and the field of "
-        "pressure for ParaView; or a file with one of these suffixes: .glb, .csv, .vti.",
-        callback=_note_export,
-        rich_help_panel=_GAS,
-    ),
-    quantity: str | None = typer.Option(
-        None,
-        help="Quantity of --heat-map: impulse or peak.",
-        show_default="impulse",
-        rich_help_panel=_GAS,
-    ),
-    gauge: str | None = typer.Option(
-        None,
-        help="Gauge of --history, beside Kingery-Bulmash.",
-        show_default="the scenario's first",
-        rich_help_panel=_GAS,
-    ),
-    preset: str | None = typer.Option(
-        None,
-        help="Parameters of this name instead of the scenario's.",
-        rich_help_panel=_PARTICLES,
-    ),
+    export: _ExportOption = None,
+    quantity: _QuantityOption = None,
+    gauge: _GaugeOption = None,
+    preset: _PresetOption = None,
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     as_json: JsonOption = False,
@@ -112,20 +132,12 @@ def simulate(
     places of the load, --history its course over time.
     """
     given = ChargeInput.of(charge, tnt_kg)
-    own = load_scenario(scenario)
-    site = own if stand_off_m is None else own.at_stand_off(stand_off_m)
-    site = site.with_simulation(preset)
-    # A layout belongs to the site of the file, before preset and stand-off change it.
-    elements: Layout = () if layout is None else tuple(load_layout(layout, own))
+    site, elements = _site_and_layout(scenario, layout, stand_off_m, preset)
     used = find_engine(engine, cell_m, until=until, cells=cells)
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
-    names = [field.name for field in fields(BlastFiles) if field.name in context.params]
-    files = BlastFiles(**{name: context.params[name] for name in names})
-    if export is not None:
-        check_blast_target(export)  # before the blast, so that it is not lost
-        files = replace(files, further=blast_recorders(export))
+    files = _files(context, export)
     fixed = given.fixed(site, draw_threat(site, seed))
     blast: Any = used.blast(site, elements, seed, fixed)
     files.check(blast)
@@ -143,6 +155,27 @@ def simulate(
         return
     print_line(used.describe([site]))
     print_outcome(blast_answer(result), written)
+
+
+def _site_and_layout(
+    scenario: str, layout: Path | None, stand_off_m: float | None, preset: str | None
+) -> tuple[Scenario, Layout]:
+    """Return the site of the blast, and the layout for it."""
+    own = load_scenario(scenario)
+    site = own if stand_off_m is None else own.at_stand_off(stand_off_m)
+    # A layout belongs to the site of the file, before preset and stand-off change it.
+    elements: Layout = () if layout is None else tuple(load_layout(layout, own))
+    return site.with_simulation(preset), elements
+
+
+def _files(context: typer.Context, export: Path | None) -> BlastFiles:
+    """Return the files of the command line that are made while the blast runs, or after it."""
+    names = [field.name for field in fields(BlastFiles) if field.name in context.params]
+    files = BlastFiles(**{name: context.params[name] for name in names})
+    if export is None:
+        return files
+    check_blast_target(export)  # before the blast, so that it is not lost
+    return replace(files, further=blast_recorders(export))
 
 
 def _refuse_of_other_engines(context: typer.Context, engine: Engine) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 import typer
@@ -49,51 +49,64 @@ _SETTINGS: Final = ("steps", "seed", "threat", "engine", "observation", "cell_m"
 _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 """Options allowed with `--resume`; the run folder fixes the others."""
 
-
-def train(
-    context: typer.Context,
-    algo: str | None = typer.Option(
-        None, help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM
-    ),
-    scenario: str | None = typer.Option(
-        None,
+_AlgoOption = Annotated[
+    str | None, typer.Option(help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM)
+]
+_ScenarioOption = Annotated[
+    str | None,
+    typer.Option(
         help="Bundled name, a scenario file, or 'sites' for generated ones.",
         show_default=_DEFAULT_SCENARIO,
     ),
-    steps: int | None = typer.Option(
-        None,
-        help="Steps, a module or piece each; else as in the YAML file.",
-        min=1,
+]
+_StepsOption = Annotated[
+    int | None, typer.Option(help="Steps, a module or piece each; else as in the YAML file.", min=1)
+]
+_EnvsOption = Annotated[
+    int | None, typer.Option(help="Parallel environments; else as in the YAML file.", min=1)
+]
+_ThreatOption = Annotated[
+    str | None,
+    typer.Option(
+        help="visible or hidden: whether the agent sees the charge.", show_default="visible"
     ),
-    seed: int | None = typer.Option(None, help="Decides everything.", min=0, show_default="0"),
-    envs: int | None = typer.Option(
-        None,
-        help="Parallel environments; else as in the YAML file.",
-        min=1,
-    ),
-    run: Path | None = writes("Folder for the run; new or empty"),
-    threat: str | None = typer.Option(
-        None,
-        help="visible or hidden: whether the agent sees the charge.",
-        show_default="visible",
-    ),
-    engine: str | None = typer.Option(None, help=_ENGINE_HELP, show_default=BY_SITE),
-    cell_m: CellOption = None,
-    cells: CellsOption = None,
-    observation: str | None = typer.Option(
-        None,
+]
+_ObservationOption = Annotated[
+    str | None,
+    typer.Option(
         help="Observation: grid, image (with a CnnPolicy), or features (with an MlpPolicy).",
         show_default="grid",
     ),
+]
+_StartFromOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Run folder with the initial weights (its best), for a scenario of this size."
+    ),
+]
+_ResumeOption = Annotated[
+    Path | None, typer.Option(help="Resume the run of this folder; no other option but --cluster.")
+]
+
+
+def train(
+    context: typer.Context,
+    algo: _AlgoOption = None,
+    scenario: _ScenarioOption = None,
+    steps: _StepsOption = None,
+    seed: int | None = typer.Option(None, help="Decides everything.", min=0, show_default="0"),
+    envs: _EnvsOption = None,
+    run: Path | None = writes("Folder for the run; new or empty"),
+    threat: _ThreatOption = None,
+    engine: str | None = typer.Option(None, help=_ENGINE_HELP, show_default=BY_SITE),
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
+    observation: _ObservationOption = None,
     changes: list[str] = typer.Option(
         [], "--set", help="key=value, e.g. ent_coef=0.01; may be given again."
     ),
-    start_from: Path | None = typer.Option(
-        None, help="Run folder with the initial weights (its best), for a scenario of this size."
-    ),
-    resume: Path | None = typer.Option(
-        None, help="Resume the run of this folder; no other option but --cluster."
-    ),
+    start_from: _StartFromOption = None,
+    resume: _ResumeOption = None,
     cluster: ClusterAddress = None,
 ) -> None:
     """Train an agent that proposes layouts, or resume an interrupted training."""
