@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from blast_env.geometry import Element, Layout, standing
-from blast_env.layout.placement import LayoutState, check_layout, usable_cells
+from blast_env.layout.placement import LayoutState, check_layout, obstacles_of, usable_cells
 from blast_env.site import (
     AnyCharge,
     Scenario,
@@ -15,7 +15,6 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
-from blast_env.site.obstacles import obstacles_of
 from blast_env.site.structures import AnyStructure, ConcreteSquareSection
 from blast_env.site.terraces import ground_below_m
 from blast_env.values import checked_seed
