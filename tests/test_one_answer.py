@@ -96,7 +96,7 @@ class Asked:
     def on(cls, name: str, folder: Path) -> "Asked":
         """Return a bundled site with one of its charges, or two, and the layout of a rule."""
         site = load_scenario(name)
-        if any(each.protected and each.facade is None for each in site.structures):
+        if any(structure.protected and structure.facade is None for structure in site.structures):
             site = site.with_facades(GLASS, WALL)
         charges = [threat.charge_against(site) for threat in threats_of(site)]
         charges = list(dict.fromkeys(charges))[: 1 + (name not in ONE_THREAT)]

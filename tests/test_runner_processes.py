@@ -74,8 +74,8 @@ def eventually(condition: Callable[[], bool]) -> None:
 
 def group_of(leader: int) -> list[int]:
     """Return the running processes of a group."""
-    numbers = [int(each.name) for each in Path("/proc").iterdir() if each.name.isdigit()]
-    return [each for each in numbers if is_there(each) and os.getpgid(each) == leader]
+    numbers = [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
+    return [number for number in numbers if is_there(number) and os.getpgid(number) == leader]
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_workers_and_their_trackers_end_when_their_parent_is_killed(tmp_path: Pa
     try:
         eventually(lambda: len(list(started.iterdir())) == 2)
         group = group_of(process.pid)
-        assert {int(each.name) for each in started.iterdir()} < {*group}
+        assert {int(path.name) for path in started.iterdir()} < {*group}
         process.kill()
         process.wait()
         eventually(lambda: not any(map(is_there, group)))

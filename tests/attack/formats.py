@@ -89,7 +89,9 @@ def _layout(folder: Path) -> Format:
 
     def read(path: Path) -> Any:
         file = LayoutFile.load(path)
-        return file if any(len(each) > 2 for each in file.layout) else file.layout_for(scenario)
+        return (
+            file if any(len(element) > 2 for element in file.layout) else file.layout_for(scenario)
+        )
 
     return Format(samples, _from_file(path, read))
 
@@ -147,7 +149,7 @@ def _weights(folder: Path) -> Format:
 
     def read(path: Path) -> Any:
         found = read_parameters(path)["policy"]
-        return {name: each.numpy().tobytes() for name, each in found.items()}
+        return {name: tensor.numpy().tobytes() for name, tensor in found.items()}
 
     return Format((path.read_bytes(),), _from_file(path, read), True)
 

@@ -71,7 +71,7 @@ def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
     assert standing(found.layout) == ()
     glass, panels = Measure.named("glass"), Measure.named("panels")
     choices = ((), (glass,), (panels,), (glass, panels))
-    assert found.worth == min(problem.load(each) for each in choices)
+    assert found.worth == min(problem.load(layout) for layout in choices)
     together = advise(problem, MeasureKind.TOGETHER, 12, begin_with=(found.layout,))
     assert together.worth <= found.worth
     assert together.blasts <= 12
@@ -143,11 +143,13 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
     scenario = glazed_yard(target="medium")
     problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     found = advise(problem, MeasureKind.HARDEN, 5)
-    assert [each.cost for each in found.tried] == [0.0, 5.0, 4.0, 9.0]
-    front = cheapest([DamagePrice(each.cost, each.damage) for each in found.tried])
-    assert [each.damage for each in front] == sorted((each.damage for each in front), reverse=True)
+    assert [layout.cost for layout in found.tried] == [0.0, 5.0, 4.0, 9.0]
+    front = cheapest([DamagePrice(layout.cost, layout.damage) for layout in found.tried])
+    assert [layout.damage for layout in front] == sorted(
+        (layout.damage for layout in front), reverse=True
+    )
     assert front[0].cost == 0.0
-    assert front[-1].damage == min(each.damage for each in found.tried)
+    assert front[-1].damage == min(layout.damage for layout in found.tried)
 
 
 def test_what_a_judge_fails_is_searched_for_again_with_a_margin() -> None:
@@ -174,10 +176,10 @@ def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budge
     scenario = only(glazed_yard(target="medium"), MeasureKind.SHIELD)
     charges = [Charge((2.0, y_m), 5.0) for y_m in (2.0, 10.0)]
     layouts = list(against_each(scenario, charges))
-    costs = [LayoutState(scenario, each).cost for each in layouts]
+    costs = [LayoutState(scenario, layout).cost for layout in layouts]
     assert 0.0 < max(costs) <= (scenario.zone.budget or 0.0)
     middle = scenario.zone.rows / 2
-    assert any(min(x[0] for x in each) < middle < max(x[0] for x in each) for each in layouts)
+    assert any(min(x[0] for x in layout) < middle < max(x[0] for x in layout) for layout in layouts)
     assert list(against_each(scenario, charges[:1])) == []
 
 

@@ -74,15 +74,15 @@ def test_any_damage_is_an_error_or_a_missing_content_and_never_a_wrong_one(tmp_p
     path = tmp_path / "store"
     filled(path).__del__()  # which closes it, so that all of it is in one file
     whole = path.read_bytes()
-    assert [each.name for each in tmp_path.iterdir()] == ["store"]
+    assert [path.name for path in tmp_path.iterdir()] == ["store"]
     flipped = [
         whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
         for place in range(0, len(whole), 331)
     ]
     refused = 0
     for content in [*flipped, whole[: len(whole) // 2], whole[:50], b"x" * 5000]:
-        for each in tmp_path.iterdir():
-            each.unlink()
+        for path in tmp_path.iterdir():
+            path.unlink()
         path.write_bytes(content)
         try:
             with warnings.catch_warnings(record=True) as notes:
@@ -94,7 +94,7 @@ def test_any_damage_is_an_error_or_a_missing_content_and_never_a_wrong_one(tmp_p
         else:
             assert len(notes) == (1 if store.damaged else 0)
             whole_or_none = zip(found, range(3), strict=True)
-            assert all(each in (None, bytes([k]) * 2000) for each, k in whole_or_none)
+            assert all(content in (None, bytes([k]) * 2000) for content, k in whole_or_none)
     assert refused >= 3
 
 
@@ -344,7 +344,7 @@ def test_a_file_that_is_damaged_later_costs_warnings_and_no_result(tmp_path: Pat
         other.commit()
     with pytest.warns(BlastEnvWarning) as warned:
         assert same(again.loads(*PAIRS[0]), first)
-    words = [str(each.message)[:25] for each in warned]
+    words = [str(warning.message)[:25] for warning in warned]
     assert words == ["a blast counts as missing", "a blast is not kept: " + words[1][21:]]
 
 
@@ -391,10 +391,13 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
         lambda good: replace(good, module_impulse_sim=good.module_impulse_sim * np.nan),
         lambda good: replace(good, structures=good.structures[:0]),
         lambda good: replace(
-            good, structures=tuple(replace(each, name="x") for each in good.structures)
+            good, structures=tuple(replace(structure, name="x") for structure in good.structures)
         ),
         lambda good: replace(
-            good, structures=tuple(replace(each, impulse_pa_s=np.inf) for each in good.structures)
+            good,
+            structures=tuple(
+                replace(structure, impulse_pa_s=np.inf) for structure in good.structures
+            ),
         ),
     ],
 )

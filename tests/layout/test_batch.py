@@ -18,7 +18,7 @@ SITES = (
 )
 
 
-@pytest.mark.parametrize("scenario", SITES, ids=lambda each: each.name)
+@pytest.mark.parametrize("scenario", SITES, ids=lambda scenario: scenario.name)
 @settings(max_examples=8)
 @given(seed=st.integers(0, 2**32 - 1), begun=st.integers(0, 2))
 def test_a_layout_grows_as_one_placed_piece_by_piece(

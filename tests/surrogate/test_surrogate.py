@@ -197,15 +197,15 @@ def test_compiled_layers_are_those_of_the_formula(rows: int) -> None:
     networks = Networks(members)
     related, features = rng.normal(0.0, 3.0, (rows, 15)), rng.normal(0.0, 3.0, (rows, FEATURES))
     heard = networks.messages(related)
-    for number, each in enumerate(members):
-        sent = silu(related @ each.send + each.send_bias)
-        said = silu(sent @ each.message + each.message_bias)
+    for number, member in enumerate(members):
+        sent = silu(related @ member.send + member.send_bias)
+        said = silu(sent @ member.message + member.message_bias)
         assert heard[number] == pytest.approx(said, abs=1e-4)
         both = np.hstack((features, said))
-        first = silu(both @ each.first + each.first_bias)
-        second = silu(first @ each.second + each.second_bias)
+        first = silu(both @ member.first + member.first_bias)
+        second = silu(first @ member.second + member.second_bias)
         differs = networks(features, heard)[number]
-        assert differs == pytest.approx((second @ each.last + each.last_bias)[:, 0], abs=1e-3)
+        assert differs == pytest.approx((second @ member.last + member.last_bias)[:, 0], abs=1e-3)
     assert (networks.messages(related[-1:])[:, 0] == heard[:, -1]).all()
 
 

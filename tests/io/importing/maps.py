@@ -36,7 +36,7 @@ def outline(places: Places, **tags: Any) -> dict[str, Any]:
 
 
 def line(places: Sequence[Sequence[float]], **tags: Any) -> dict[str, Any]:
-    geometry = {"type": "LineString", "coordinates": [list(each) for each in places]}
+    geometry = {"type": "LineString", "coordinates": [list(place_m) for place_m in places]}
     return {"type": "Feature", "properties": tags, "geometry": geometry}
 
 

@@ -79,7 +79,7 @@ class Model:
         return make("IfcConversionBasedUnit", size, "LENGTHUNIT", "FOOT", value)
 
     def _point(self, *place: float) -> Any:
-        scaled = [float(self.scale * each) for each in place]
+        scaled = [float(self.scale * shift_m) for shift_m in place]
         return self.file.create_entity("IfcCartesianPoint", scaled)
 
     def _axes(self, place: Place, turn_deg: float = 0.0) -> Any:
@@ -90,7 +90,7 @@ class Model:
         return make("IfcAxis2Placement3D", self._point(*place), self._direction(0, 0, 1), ahead)
 
     def _direction(self, *ratios: float) -> Any:
-        return self.file.create_entity("IfcDirection", [float(each) for each in ratios])
+        return self.file.create_entity("IfcDirection", [float(ratio) for ratio in ratios])
 
     def _rooted(self, kind: str, name: str) -> Any:
         return self.file.create_entity(kind, GlobalId=ifcopenshell.guid.new(), Name=name)
@@ -216,7 +216,9 @@ class Model:
     def _extruded(self, outline: shapely.Polygon, rise_m: float) -> tuple[str, list[Any]]:
         rings = (outline.exterior, *outline.interiors)
         lines = [
-            self.file.create_entity("IfcPolyline", [self._point(*each) for each in ring.coords])
+            self.file.create_entity(
+                "IfcPolyline", [self._point(*corner_m) for corner_m in ring.coords]
+            )
             for ring in rings
         ]
         kind = "IfcArbitraryProfileDefWithVoids" if lines[1:] else "IfcArbitraryClosedProfileDef"
@@ -234,7 +236,7 @@ class Model:
         make = self.file.create_entity
         x, _, z = size
         corners = [(0.0, 0.0, 0.0), (x, 0.0, 0.0), (x, 0.0, z), (0.0, 0.0, z)]
-        loop = make("IfcPolyLoop", [self._point(*each) for each in corners])
+        loop = make("IfcPolyLoop", [self._point(*corner_m) for corner_m in corners])
         face = make("IfcFace", [make("IfcFaceOuterBound", loop, True)])
         shell = make("IfcOpenShell", [face])
         return "SurfaceModel", [make("IfcShellBasedSurfaceModel", [shell])]

@@ -49,9 +49,9 @@ PLAIN = st.one_of(WORDS, st.text(max_size=8), st.integers(), st.floats(), st.boo
 NUMBERS = st.sampled_from((0, -1, 1e308, 1e-320, 10**400, float("nan"), float("inf"), 1e9, 2.5))
 VALUES = st.recursive(
     st.one_of(PLAIN, NUMBERS),
-    lambda each: st.one_of(
-        st.lists(each, max_size=3),
-        st.dictionaries(st.one_of(KEYS, st.sampled_from(("value", "values", "key"))), each),
+    lambda values: st.one_of(
+        st.lists(values, max_size=3),
+        st.dictionaries(st.one_of(KEYS, st.sampled_from(("value", "values", "key"))), values),
     ),
     max_leaves=6,
 )

@@ -43,7 +43,7 @@ def test_any_attribute_of_an_entity(
     changes: list[tuple[int, str, Any]],
 ) -> None:
     document = readfile(case)
-    blocks = [each for block in document.blocks for each in block]
+    blocks = [entity for block in document.blocks for entity in block]
     entities = [*document.modelspace(), *blocks]
     for number, key, value in changes:
         with suppress(DXFError, TypeError, ValueError, AttributeError, OverflowError):

@@ -192,9 +192,9 @@ def test_a_building_that_modules_cannot_show_is_named(tmp_path: Path) -> None:
     thin = outline(rectangle(10, 0, 20, 0.4), name="wall")
     house = HOUSE | {"geometry": outline(rectangle(20, 8, 6, 4))["geometry"]}
     site = import_site(written(tmp_path, tower, house, thin, PLACE), ImportOptions())
-    off = [each.name for each in site.ledger.of(Fate.GUESSED) if "modules miss" in each.kind]
+    off = [entry.name for entry in site.ledger.of(Fate.GUESSED) if "modules miss" in entry.kind]
     assert "building_1" in off
-    assert "wall" in (*off, *(each.name for each in site.ledger.of(Fate.LEFT_OUT)))
+    assert "wall" in (*off, *(entry.name for entry in site.ledger.of(Fate.LEFT_OUT)))
 
 
 def test_a_site_of_too_many_buildings(tmp_path: Path) -> None:
@@ -259,13 +259,13 @@ def test_streets_of_too_many_bends(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
     text = BLOCK.with_suffix(".osm").read_text()
-    line = next(each for each in text.splitlines() if '<node id="7"' in each)
+    line = next(line for line in text.splitlines() if '<node id="7"' in line)
     path = tmp_path / "cut.osm"
     path.write_text(text.replace(f"{line}\n", ""))
     site = import_site(path, HALL)
-    (cut,) = (each for each in site.ledger.of(Fate.LEFT_OUT) if each.kind == osm.CUT)
+    (cut,) = (entry for entry in site.ledger.of(Fate.LEFT_OUT) if entry.kind == osm.CUT)
     assert (cut.place, cut.name) == ("way 2", "Baker")
-    assert "Baker" not in [each.name for each in site.buildings]
+    assert "Baker" not in [building.name for building in site.buildings]
     assert "--protect is 'baker', which is left out: way 2" in error_of(
         path, replace(HALL, protect=("baker",))
     )

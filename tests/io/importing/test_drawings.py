@@ -29,12 +29,15 @@ def case(name: str, **options: Any) -> SiteImport:
 
 def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
     """Return area, underside and height of the buildings, the largest first."""
-    found = [(round(each.outline.area, 1), each.base_m, each.height_m) for each in site.buildings]
+    found = [
+        (round(building.outline.area, 1), building.base_m, building.height_m)
+        for building in site.buildings
+    ]
     return sorted(found, reverse=True)
 
 
 def kinds(site: SiteImport, fate: Fate) -> list[str]:
-    return [each.kind for each in site.ledger.of(fate)]
+    return [entry.kind for entry in site.ledger.of(fate)]
 
 
 class Drawing:
@@ -68,13 +71,13 @@ def test_heights_above_the_sea_count_from_the_ground() -> None:
 
 def test_hidden_entities_are_no_houses() -> None:
     site = case("invisible")
-    assert [each[0] for each in boxes(site)] == [200.0]
+    assert [box[0] for box in boxes(site)] == [200.0]
     assert kinds(site, Fate.LEFT_OUT) == ["entities that are not shown"]
 
 
 def test_a_house_beyond_a_layer_called_site_is_left_out_by_name() -> None:
     site = case("layer_site2")
-    assert [each[0] for each in boxes(site)] == [200.0]
+    assert [box[0] for box in boxes(site)] == [200.0]
     (line,) = site.ledger.of(Fate.LEFT_OUT)
     assert line.kind.startswith("outside the outline of the site in the file")
     with pytest.raises(BlastEnvError, match="outside the outline of the site"):
@@ -88,7 +91,7 @@ def test_faces_that_meet_are_a_body() -> None:
 
 
 def test_mirrored_text_names_the_house_that_it_stands_in() -> None:
-    assert [each.title for each in case("text_ocs").buildings] == ["Court"]
+    assert [building.title for building in case("text_ocs").buildings] == ["Court"]
 
 
 def test_a_tower_on_a_podium_stands_on_it(tmp_path: Path) -> None:
@@ -108,7 +111,7 @@ def test_houses_on_a_slope_stand_on_their_own_ground(tmp_path: Path) -> None:
     drawing.house(40, 436, 6)
     site = drawing.imported(tmp_path)
     assert boxes(site) == [(200.0, 0.0, 9.0), (200.0, 0.0, 6.0)]
-    assert [each.detail for each in site.ledger.of(Fate.GUESSED)] == ["431 m", "436 m"]
+    assert [entry.detail for entry in site.ledger.of(Fate.GUESSED)] == ["431 m", "436 m"]
 
 
 @pytest.mark.parametrize(
@@ -132,7 +135,7 @@ def test_what_stands_on_nothing_is_raised_or_on_ground_of_its_own(
     drawing.house(40, base, rise)
     site = drawing.imported(tmp_path)
     assert boxes(site)[0] == expected
-    assert [each[: len(words)] for each in kinds(site, Fate.GUESSED)] == [words] * bool(words)
+    assert [kind[: len(words)] for kind in kinds(site, Fate.GUESSED)] == [words] * bool(words)
     assert bool(kinds(site, Fate.CUT)) == (base < 0)
 
 
@@ -143,7 +146,7 @@ def test_a_bridge_between_houses_stays_up_and_is_said(tmp_path: Path) -> None:
     drawing.house(20, 406, 3, width=10)
     site = drawing.imported(tmp_path)
     assert boxes(site) == [(200.0, 0.0, 12.0), (200.0, 0.0, 12.0), (100.0, 6.0, 9.0)]
-    assert any(IN_AIR in each for each in kinds(site, Fate.GUESSED))
+    assert any(IN_AIR in kind for kind in kinds(site, Fate.GUESSED))
 
 
 def test_what_lies_below_the_ground_is_left_out(tmp_path: Path) -> None:
@@ -173,11 +176,11 @@ def test_layers_that_are_off_are_read_and_said(tmp_path: Path) -> None:
     assert kinds(site, Fate.NOTED) == ["layers that are off or frozen, read as others"]
 
 
-@pytest.mark.parametrize("name", sorted(each.stem[2:] for each in CASES.glob("d_*.dxf")))
+@pytest.mark.parametrize("name", sorted(path.stem[2:] for path in CASES.glob("d_*.dxf")))
 def test_every_entity_of_a_drawing_has_one_fate(name: str) -> None:
     count = 0
-    for each in readfile(CASES / f"d_{name}.dxf").modelspace():
-        block = each.block() if isinstance(each, Insert) else None
+    for entity in readfile(CASES / f"d_{name}.dxf").modelspace():
+        block = entity.block() if isinstance(entity, Insert) else None
         count += 1 if block is None else len(list(block))
     assert len(case(name).ledger.of(*FATES)) == count
 
@@ -194,8 +197,8 @@ def test_a_stretched_tower_keeps_its_height(tmp_path: Path) -> None:
     drawing.space.add_blockref("TOWER", (0, 0), dxfattribs=scales)
     drawing.house(100.0, 0.0, 9.0)
     oval, house, half = sorted(
-        (each.outline.area, each.base_m, each.height_m)
-        for each in drawing.imported(tmp_path, protect_near=(110.0, 5.0)).buildings
+        (building.outline.area, building.base_m, building.height_m)
+        for building in drawing.imported(tmp_path, protect_near=(110.0, 5.0)).buildings
     )
     assert oval == pytest.approx((np.pi * 50.0, 1.5, 19.5), rel=0.01)
     assert house == (200.0, 0.0, 9.0)

@@ -260,10 +260,12 @@ def test_every_entity_has_its_fate_and_every_building_its_solid(
 ) -> None:
     site = imported(town, tmp_path_factory.mktemp("drawn"))
     entries = site.ledger.of(*FATES)
-    assert len({each.place for each in entries}) == len(entries)
-    assert sorted(each.fate for each in entries) == sorted(town.fates)
-    solids = [(each.outline.area, each.base_m, each.height_m) for each in site.buildings]
+    assert len({entry.place for entry in entries}) == len(entries)
+    assert sorted(entry.fate for entry in entries) == sorted(town.fates)
+    solids = [
+        (building.outline.area, building.base_m, building.height_m) for building in site.buildings
+    ]
     expected = sorted(town.boxes)
     rounded = sorted((round(area, 1), base, height) for area, base, height in solids)
-    assert [each[1:] for each in rounded] == [each[1:] for each in expected]
-    assert [each[0] for each in rounded] == pytest.approx([each[0] for each in expected], rel=0.02)
+    assert [box[1:] for box in rounded] == [box[1:] for box in expected]
+    assert [box[0] for box in rounded] == pytest.approx([box[0] for box in expected], rel=0.02)

@@ -113,7 +113,7 @@ def test_everything_left_out_of_a_model_is_named_by_its_id(tmp_path: Path) -> No
     column = model.box("IfcColumn", 0, (2000.0, -3000.0, 0.0), (400.0, 400.0, 3000.0))
     chair = model.box("IfcFurniture", 0, (3000.0, 3000.0, 0.0), (500.0, 500.0, 900.0))
     left_out = model.imported(tmp_path).ledger.of(Fate.LEFT_OUT)
-    assert {each.place for each in left_out} == {f"IfcColumn {column}", f"IfcFurniture {chair}"}
+    assert {entry.place for entry in left_out} == {f"IfcColumn {column}", f"IfcFurniture {chair}"}
 
 
 def test_a_model_without_a_unit_or_a_building_is_refused(tmp_path: Path) -> None:

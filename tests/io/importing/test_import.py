@@ -65,10 +65,10 @@ def in_utm(feature: dict[str, Any]) -> Any:
 
 def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: SiteImport) -> None:
     assert block.site.rotation_deg == pytest.approx(23.0, abs=0.01)
-    assert [each.title for each in block.buildings if each.protected] == ["Town Hall"]
-    for each in block.buildings:
-        assert each.deviation.outline_m < 0.75 * MODULE_M
-        assert each.area_m2 == pytest.approx(each.outline.area, rel=0.06)
+    assert [building.title for building in block.buildings if building.protected] == ["Town Hall"]
+    for building in block.buildings:
+        assert building.deviation.outline_m < 0.75 * MODULE_M
+        assert building.area_m2 == pytest.approx(building.outline.area, rel=0.06)
     georeference = block.scenario.georeference
     assert isinstance(georeference, MapGeoreference)
     assert georeference.rotation_deg == pytest.approx(23.0, abs=0.01)
@@ -76,7 +76,7 @@ def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: SiteImp
 
 
 def test_heights_are_those_of_the_map_in_whole_modules(block: SiteImport) -> None:
-    heights = {each.title: each.height_m for each in block.buildings}
+    heights = {building.title: building.height_m for building in block.buildings}
     assert heights == {
         "Town Hall": 10.5,
         "Baker": 9.0,
@@ -86,7 +86,7 @@ def test_heights_are_those_of_the_map_in_whole_modules(block: SiteImport) -> Non
         "Water Tower": 18.0,
         "Chapel": 9.0,  # the median of its neighbours
     }
-    (guess,) = (each for each in block.ledger.of(Fate.GUESSED) if "heights" in each.kind)
+    (guess,) = (entry for entry in block.ledger.of(Fate.GUESSED) if "heights" in entry.kind)
     assert (guess.place, guess.name) == ("features[6]", "Chapel")
     assert guess.detail.startswith("9.0 m as 7 neighbours, low ")
 
@@ -97,13 +97,13 @@ def test_streets_are_places_of_charges_as_likely_on_every_metre(block: SiteImpor
     for source in sources:
         (x0, y0), (x1, y1) = ends_m(source)
         assert source.weight == pytest.approx(np.hypot(x1 - x0, y1 - y0), abs=0.01)
-    assert sum(each.weight for each in sources) == pytest.approx(2.0 * 84.0, abs=2.0)
+    assert sum(source.weight for source in sources) == pytest.approx(2.0 * 84.0, abs=2.0)
 
 
 def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: SiteImport) -> None:
     zone = block.scenario.zone
     assert (zone.rows, zone.columns) == (8, 64)  # 4 m x 32 m
-    assert [each.reason for each in zone.keep_outs] == ["monument"]
+    assert [keep_out.reason for keep_out in zone.keep_outs] == ["monument"]
     covered = zone.keep_outs[0].rectangle_m
     (monument,) = block.site.of_role(Role.KEEP_OUT)
     assert shapely.covers(shapely.box(*covered).buffer(0.03), monument.geometry)
@@ -158,7 +158,9 @@ def test_layout_lands_on_the_map_where_it_belongs(block: SiteImport, tmp_path: P
     for name, pieces in parts.items():
         modules = shapely.union_all(pieces, grid_size=0.01)
         assert shapely.hausdorff_distance(modules, originals[name]) < MODULE_M
-    (module,) = (each for each in content["features"] if each["properties"]["kind"] == "barrier")
+    (module,) = (
+        feature for feature in content["features"] if feature["properties"]["kind"] == "barrier"
+    )
     square = in_utm(module)
     assert square.area == pytest.approx(0.25, rel=0.002)
     zone = in_utm(json.loads(BLOCK.read_text())["features"][-2])
@@ -168,9 +170,9 @@ def test_layout_lands_on_the_map_where_it_belongs(block: SiteImport, tmp_path: P
 def test_what_is_exported_can_be_imported_again(block: SiteImport, tmp_path: Path) -> None:
     path = export_layout(LayoutPlan(block.scenario, ()), tmp_path / "block.geojson")
     again = import_site(path)
-    mine, new = (comparable(each) for each in (block.scenario, again.scenario))
+    mine, new = (comparable(scenario) for scenario in (block.scenario, again.scenario))
     for one, other in zip(mine.pop("structures"), new.pop("structures"), strict=True):
-        own, again_m = (shapely.Polygon(each.pop("outline_m")) for each in (one, other))
+        own, again_m = (shapely.Polygon(part.pop("outline_m")) for part in (one, other))
         assert shapely.hausdorff_distance(own, again_m) < 0.01
         assert one == other
     assert mine == new
@@ -200,7 +202,9 @@ def test_map_in_another_reference_system_goes_back_to_it(tmp_path: Path) -> None
         export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson").read_text()
     )
     assert content["crs"]["properties"]["name"] == name
-    zone = next(each for each in content["features"] if each["properties"]["kind"] == "build_zone")
+    zone = next(
+        feature for feature in content["features"] if feature["properties"]["kind"] == "build_zone"
+    )
     original = shapely.geometry.shape(collection["features"][-2]["geometry"])
     assert shapely.hausdorff_distance(
         shapely.geometry.shape(zone["geometry"]), original
@@ -213,7 +217,9 @@ def test_drawing_goes_back_to_its_own_millimetres(tmp_path: Path) -> None:
         export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson").read_text()
     )
     assert "units of 0.001 m" in content["coordinate_system"]
-    zone = next(each for each in content["features"] if each["properties"]["kind"] == "build_zone")
+    zone = next(
+        feature for feature in content["features"] if feature["properties"]["kind"] == "build_zone"
+    )
     ring = np.array(zone["geometry"]["coordinates"][0]) / 1000.0 - [5000.0, 3000.0]
     turned = shapely.affinity.rotate(shapely.Polygon(ring), -23.0, origin=(0, 0))
     assert shapely.hausdorff_distance(turned, shapely.box(36, 27, 68, 31)) < MODULE_M
@@ -257,7 +263,9 @@ def test_protected_is_what_is_named_near_or_marked(tmp_path: Path) -> None:
     )
 
     def protected(**options: Any) -> list[str]:
-        return [each.name for each in imported(path, **options).buildings if each.protected]
+        return [
+            building.name for building in imported(path, **options).buildings if building.protected
+        ]
 
     assert protected() == ["Strasse_5"]
     assert protected(protect=("nord schule",)) == ["Nord_Schule"]
@@ -287,7 +295,7 @@ def test_properties_say_what_is_what_where_the_user_says_which(tmp_path: Path) -
     (house,) = site.buildings
     assert house.height_m == 7.0
     assert (site.scenario.zone.rows, site.scenario.zone.columns) == (6, 12)
-    assert [each.rectangle_m for each in site.scenario.zone.keep_outs] == [(10, 18, 12, 19)]
+    assert [keep_out.rectangle_m for keep_out in site.scenario.zone.keep_outs] == [(10, 18, 12, 19)]
     (area,) = site.scenario.charge
     assert (area.kind, area.tnt_kg, area.weight) == ("rectangle", 20.0, 32.0)
 
@@ -311,7 +319,9 @@ def test_zone_that_is_no_rectangle_is_closed_outside_its_outline(tmp_path: Path)
     )
     scenario = imported(path).scenario
     assert scenario.zone.rectangle_m == (20.0, 10.0, 24.0, 14.0)
-    assert [each.rectangle_m for each in scenario.zone.keep_outs] == [(22.0, 12.0, 24.0, 14.0)]
+    assert [keep_out.rectangle_m for keep_out in scenario.zone.keep_outs] == [
+        (22.0, 12.0, 24.0, 14.0)
+    ]
     assert int(usable_cells(scenario).sum()) == 48
 
 
@@ -386,7 +396,7 @@ def test_houses_wall_to_wall_leave_no_gap(gap_m: float, lean_m: float, tmp_path:
         charge(25.0, 4.0),
     )
     structures = imported(path, rotation_deg=0.0).scenario.structures
-    assert sum(each.modules for each in structures) == 4 * 12 * 8
+    assert sum(structure.modules for structure in structures) == 4 * 12 * 8
 
 
 def test_a_building_that_the_border_cuts_apart_has_two_structures(tmp_path: Path) -> None:
@@ -396,11 +406,11 @@ def test_a_building_that_the_border_cuts_apart_has_two_structures(tmp_path: Path
     )
     options = {"origin": (-8.0, 4.0), "size_m": (26.0, 12.0), "rotation_deg": 0.0}
     scenario = imported(path, charge_at=((-5.0, 10.0),), **options).scenario
-    assert [each.name for each in scenario.structures] == ["Ua", "Ub"] or [
-        each.name for each in scenario.structures
+    assert [structure.name for structure in scenario.structures] == ["Ua", "Ub"] or [
+        structure.name for structure in scenario.structures
     ] == ["U_a", "U_b"]
-    assert {each.building for each in scenario.structures} == {"U"}
-    assert sum(each.weight for each in scenario.structures) == pytest.approx(1.0)
+    assert {structure.building for structure in scenario.structures} == {"U"}
+    assert sum(structure.weight for structure in scenario.structures) == pytest.approx(1.0)
 
 
 def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
@@ -429,7 +439,9 @@ def test_the_bundled_car_park_is_what_the_page_s_command_imports() -> None:
     made = import_site(BLOCK.parent / "car_park.osm", options).scenario
     bundled = load_scenario("car_park")
     its, found = (
-        shapely.union_all([shapely.box(*box) for each in site.structures for box in each.boxes_m])
+        shapely.union_all(
+            [shapely.box(*box) for structure in site.structures for box in structure.boxes_m]
+        )
         for site in (bundled, made)
     )
     assert shapely.symmetric_difference(its, found).area < 0.01 * its.area
@@ -444,7 +456,7 @@ def test_a_point_with_a_diameter_is_a_circle(tmp_path: Path) -> None:
     house = outline(rectangle(5.0, 5.0, 10.0, 8.0), name="House")
     path = written(tmp_path, house, tank, unprotected, charge(40.0, 5.0))
     found = imported(path, protect=("House",), rotation_deg=0.0)
-    (_, circle) = sorted(found.buildings, key=lambda each: each.protected, reverse=True)
+    (_, circle) = sorted(found.buildings, key=lambda building: building.protected, reverse=True)
     assert circle.area_m2 == pytest.approx(0.25 * np.pi * 10.0**2, rel=0.04)
     assert circle.deviation.outline_m < MODULE_M
     assert circle.height_m == 6.0

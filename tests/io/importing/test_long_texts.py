@@ -65,7 +65,7 @@ def messages_of(suffix: str, number: int, asked: Mapping[str, Any]) -> Iterator[
     yield from site.notes
     yield from site.ledger.lines(tuple(Fate), MOST_LETTERS)
     yield from (entry.words for entry in site.ledger.entries)
-    yield from (f"{each.name} {each.title}" for each in site.buildings)
+    yield from (f"{building.name} {building.title}" for building in site.buildings)
     yield from (site.scenario.description, *site.scenario.import_notes)
 
 

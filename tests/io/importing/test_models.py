@@ -21,7 +21,10 @@ def case(name: str, **options: Any) -> SiteImport:
 
 def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
     """Return area, underside and height of the buildings, the largest first."""
-    found = [(round(each.outline.area, 1), each.base_m, each.height_m) for each in site.buildings]
+    found = [
+        (round(building.outline.area, 1), building.base_m, building.height_m)
+        for building in site.buildings
+    ]
     return sorted(found, reverse=True)
 
 
@@ -33,14 +36,16 @@ def pane_m(site: SiteImport) -> tuple[float, float, float]:
 
 def said(site: SiteImport, fate: Fate, words: str) -> list[str]:
     """Return the details of the lines of the ledger whose kind has these words."""
-    return [each.detail for each in site.ledger.of(fate) if words in each.kind]
+    return [entry.detail for entry in site.ledger.of(fate) if words in entry.kind]
 
 
 def test_a_tower_on_a_podium_has_two_heights() -> None:
     site = case("tower_podium")
     assert boxes(site) == [(400.0, 0.0, 6.0), (200.0, 0.0, 60.0)]
-    assert all(each.protected for each in site.buildings)
-    assert sum(each.weight for each in site.scenario.structures) == pytest.approx(1.0, abs=1e-5)
+    assert all(building.protected for building in site.buildings)
+    assert sum(structure.weight for structure in site.scenario.structures) == pytest.approx(
+        1.0, abs=1e-5
+    )
 
 
 def test_heights_count_from_the_lowest_storey_where_a_model_stands_above_the_sea() -> None:
@@ -66,7 +71,7 @@ def test_paving_is_no_building() -> None:
 def test_a_wall_of_the_site_stands() -> None:
     site = case("two_and_site_wall")
     assert boxes(site) == [(200.0, 0.0, 12.0), (200.0, 0.0, 12.0), (6.0, 0.0, 9.0)]
-    assert {each.title for each in site.buildings} == {"Court", "B1", "IfcWall"}
+    assert {building.title for building in site.buildings} == {"Court", "B1", "IfcWall"}
 
 
 def test_windows_are_those_of_outer_walls() -> None:
@@ -100,11 +105,11 @@ def test_the_north_of_a_model_is_said() -> None:
     assert said(case("true_north"), Fate.NOTED, "north of the model") == [words]
 
 
-@pytest.mark.parametrize("name", sorted(each.stem[2:] for each in CASES.glob("i_*.ifc")))
+@pytest.mark.parametrize("name", sorted(path.stem[2:] for path in CASES.glob("i_*.ifc")))
 def test_every_element_of_a_model_has_one_fate(name: str) -> None:
     import ifcopenshell
 
     model = ifcopenshell.open(str(CASES / f"i_{name}.ifc"))
     objects = [*model.by_type("IfcElement"), *model.by_type("IfcBuilding")]
-    places = sorted(each.place for each in case(name).ledger.of(*FATES))
-    assert places == sorted(f"{each.is_a()} {each.GlobalId}" for each in objects)
+    places = sorted(entry.place for entry in case(name).ledger.of(*FATES))
+    assert places == sorted(f"{entry.is_a()} {entry.GlobalId}" for entry in objects)

@@ -71,13 +71,13 @@ def area_m2(shape: BaseGeometry) -> float:
 
 
 def check(site: SiteImport, shapes: dict[str, tuple[BaseGeometry, dict[str, str]]]) -> None:
-    assert {each.place for each in site.buildings} == shapes.keys()
-    for each in site.buildings:
-        shape, tags = shapes[each.place]
-        assert each.outline.area == pytest.approx(area_m2(shape), rel=1e-4)
-        assert each.height_m == float(tags["height"])
-        assert each.base_m == float(tags["min_height"])
-    bounds = shapely.union_all([each.outline for each in site.buildings])
+    assert {building.place for building in site.buildings} == shapes.keys()
+    for building in site.buildings:
+        shape, tags = shapes[building.place]
+        assert building.outline.area == pytest.approx(area_m2(shape), rel=1e-4)
+        assert building.height_m == float(tags["height"])
+        assert building.base_m == float(tags["min_height"])
+    bounds = shapely.union_all([building.outline for building in site.buildings])
     whole = shapely.union_all([shape for shape, _ in shapes.values()])
     hull_m2 = area_m2(shapely.convex_hull(whole))
     assert shapely.convex_hull(bounds).area == pytest.approx(hull_m2, rel=1e-3)
@@ -96,8 +96,8 @@ def test_buildings_of_geojson_are_those_of_shapely(
     path.write_text(json.dumps(collection))
     read = json.loads(path.read_text())["features"]
     shapes = {
-        f"features[{k}]": (shapely.geometry.shape(each["geometry"]), each["properties"])
-        for k, each in enumerate(read)
+        f"features[{k}]": (shapely.geometry.shape(feature["geometry"]), feature["properties"])
+        for k, feature in enumerate(read)
     }
     check(imported(path, TO_DEGREES.transform(*BESIDE)), shapes)
 
@@ -135,8 +135,8 @@ def write_osm(path: Path, features: list[dict[str, Any]]) -> None:
             relation = osmium.osm.mutable.Relation(id=number, members=members, tags=marks)
             relations.append(relation)
     with osmium.SimpleWriter(str(path)) as writer:
-        for each in (*nodes, *ways, *relations):
-            writer.add(each)
+        for element in (*nodes, *ways, *relations):
+            writer.add(element)
 
 
 def areas_of_osmium(path: Path) -> dict[str, tuple[BaseGeometry, dict[str, str]]]:
@@ -158,7 +158,9 @@ Solid = tuple[float, float, float]
 
 def same(site: SiteImport, expected: list[Solid]) -> None:
     """Hold the buildings of a site against solids."""
-    own = [(each.outline.area, each.base_m, each.height_m) for each in site.buildings]
+    own = [
+        (building.outline.area, building.base_m, building.height_m) for building in site.buildings
+    ]
     assert len(own) == len(expected)
     for found, wanted in zip(sorted(own), sorted(expected), strict=True):
         assert found == pytest.approx(wanted, rel=1e-3, abs=1e-6)
@@ -167,7 +169,7 @@ def same(site: SiteImport, expected: list[Solid]) -> None:
 def solid_of(corners: np.ndarray[Any, Any], faces: list[list[int]]) -> Solid:
     """Return what faces cover, and the heights of their corners (n, 3), m."""
     plans = [shapely.Polygon(corners[face, :2]) for face in faces]
-    shadow = shapely.union_all([each for each in plans if each.area > 1e-6], grid_size=1e-5)
+    shadow = shapely.union_all([plan for plan in plans if plan.area > 1e-6], grid_size=1e-5)
     return shadow.area, float(corners[:, 2].min()), float(corners[:, 2].max())
 
 
@@ -207,7 +209,7 @@ def draw_prism(
     how: tuple[float, str],
 ) -> None:
     """Draw a prism on a lot; all but a mesh are without the yard."""
-    (low, high), (left_m, way) = (unit * each for each in extent_m), how
+    (low, high), (left_m, way) = (unit * length_m for length_m in extent_m), how
     space, rise = document.modelspace(), high - low
     shape = scale(translate(shape, left_m), unit, unit, origin=(0.0, 0.0))
     if way == "mesh":
@@ -246,10 +248,10 @@ def solids_of_ezdxf(path: Path, unit: float) -> Iterator[Solid]:
     for entity in recursive_decompose(readfile(path).modelspace()):
         if entity.dxftype() == "MESH":
             mesh = MeshBuilder.from_mesh(entity)
-            corners = np.array([tuple(each) for each in mesh.vertices])
+            corners = np.array([tuple(corner_m) for corner_m in mesh.vertices])
             yield solid_of(corners / unit, [list(face) for face in mesh.faces])
         else:
-            places = np.array([tuple(each) for each in entity.vertices_in_wcs()])
+            places = np.array([tuple(corner_m) for corner_m in entity.vertices_in_wcs()])
             rise = np.array(tuple(entity.dxf.extrusion)) * entity.dxf.thickness
             corners = np.concatenate([places, places + rise])
             yield solid_of(corners / unit, [list(range(len(places)))])

@@ -88,7 +88,7 @@ def test_coarser_blocks_are_whole() -> None:
 def test_direction_is_that_of_most_walls(angle: float) -> None:
     houses = [shapely.box(0, 0, 20, 10), shapely.box(30, 0, 40, 8)]
     askew = shapely.affinity.rotate(shapely.box(60, 0, 75, 12), 31.0)
-    turned = [shapely.affinity.rotate(each, angle, origin=(0, 0)) for each in (*houses, askew)]
+    turned = [shapely.affinity.rotate(house, angle, origin=(0, 0)) for house in (*houses, askew)]
     assert dominant_direction_deg(turned) == pytest.approx(angle, abs=1e-6)
 
 

@@ -177,19 +177,19 @@ def test_every_element_has_its_fate_and_every_building_its_solid(
 ) -> None:
     site = imported(model, tmp_path_factory.mktemp("models"))
     entries = site.ledger.of(*FATES)
-    assert Counter(each.place for each in entries).most_common(1)[0][1] == 1
-    assert {each.place: each.fate for each in entries} == model.fates
+    assert Counter(entry.place for entry in entries).most_common(1)[0][1] == 1
+    assert {entry.place: entry.fate for entry in entries} == model.fates
     solids = sorted(
-        (round(part.area, 1), each.base_m, each.height_m)
-        for each in site.buildings
-        for part in shapely.get_parts(each.outline)
+        (round(part.area, 1), building.base_m, building.height_m)
+        for building in site.buildings
+        for part in shapely.get_parts(building.outline)
     )
     expected = sorted(model.boxes)
-    assert [each[1:] for each in solids] == [each[1:] for each in expected]
-    assert [each[0] for each in solids] == pytest.approx([each[0] for each in expected], rel=0.01)
+    assert [box[1:] for box in solids] == [box[1:] for box in expected]
+    assert [box[0] for box in solids] == pytest.approx([box[0] for box in expected], rel=0.01)
     panes = sorted(
-        (int(each.facade["storeys"]), each.facade["width"], each.facade["height"])
-        for each in site.buildings
-        if each.facade
+        (int(building.facade["storeys"]), building.facade["width"], building.facade["height"])
+        for building in site.buildings
+        if building.facade
     )
     assert panes == sorted(model.panes)

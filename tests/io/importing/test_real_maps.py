@@ -51,11 +51,11 @@ HOUSE = outline(rectangle(0, 0, 6, 4), name="House", height=6.0, protected=True)
 
 
 def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
-    return tuple(each for each in site.ledger.of(fate) if words in each.kind)
+    return tuple(entry for entry in site.ledger.of(fate) if words in entry.kind)
 
 
 def places(found: Sequence[LedgerEntry]) -> list[str]:
-    return [each.place for each in found]
+    return [entry.place for entry in found]
 
 
 def error_of(path: Path, **options: Any) -> str:
@@ -84,7 +84,7 @@ def test_relation_without_all_ways_is_left_out_by_name(missing: str, tmp_path: P
     site = imported(path, **HOUSE_1)
     (lost,) = entries(site, Fate.LEFT_OUT, "relations of which the extract does not have all ways")
     assert (lost.place, lost.name) == ("relation 5", "Court")
-    assert any("(relation 5 'Court')" in each for each in site.scenario.import_notes)
+    assert any("(relation 5 'Court')" in note for note in site.scenario.import_notes)
     assert "--protect is 'Court', which is left out: relation 5" in error_of(
         path, protect=("Court",)
     )
@@ -102,8 +102,8 @@ def test_relation_whose_rings_share_a_side_is_put_together(tmp_path: Path) -> No
     extract.relation(5, [(10, "outer"), (11, "inner")], building="yes", height="6", name="Court")
     del outer
     site = imported(extract.write(tmp_path), **HOUSE_1)
-    (court,) = (each for each in site.buildings if each.title == "Court")
-    (house,) = (each for each in site.buildings if each.title == "House")
+    (court,) = (building for building in site.buildings if building.title == "Court")
+    (house,) = (building for building in site.buildings if building.title == "House")
     right = shapely.box(20, 0, 30, 8) - shapely.box(20, 2, 24, 6)
     right = shapely.affinity.translate(right, *house.outline.bounds[:2])
     assert shapely.hausdorff_distance(court.outline, right) < 0.1
@@ -123,7 +123,7 @@ def test_relation_of_many_rings_is_an_area_with_holes_and_islands(tmp_path: Path
     extract.relation(5, members, building="yes", height="6", name="Lattice")
     path = extract.write(tmp_path)
     site_map = read_map(path, ImportOptions())
-    (lattice,) = (each for each in site_map.features if each.place == "relation 5")
+    (lattice,) = (feature for feature in site_map.features if feature.place == "relation 5")
     area_m2 = lattice.geometry.area * DEGREE_M**2
     assert area_m2 == pytest.approx(90.0**2 - 28**2 * 4.0 + 28.0, rel=1e-3)
     assert len(shapely.get_parts(lattice.geometry)) == 29
@@ -137,17 +137,17 @@ def test_objects_may_come_in_any_order_with_any_ids(negative: bool, tmp_path: Pa
     extract.way(10, rectangle(20, 0, 10, 10))
     extract.relation(5, [(10, "outer"), (11, "inner")], building="yes", height="3", name="Court")
     site = imported(extract.write(tmp_path, backwards=True, negative=negative), **HOUSE_1)
-    areas = {each.title: each.outline.area for each in site.buildings}
+    areas = {building.title: building.outline.area for building in site.buildings}
     assert areas == pytest.approx({"House": 80.0, "Court": 84.0}, rel=0.01)
     sign = "-" if negative else ""
-    assert {each.place for each in site.buildings} == {f"way {sign}1", f"relation {sign}5"}
+    assert {building.place for building in site.buildings} == {f"way {sign}1", f"relation {sign}5"}
 
 
 def test_deleted_objects_of_the_editor_are_not_there(tmp_path: Path) -> None:
     extract = town()
     extract.way(7, rectangle(20, 0, 9, 9), "action='delete' user='a>b'", building="yes")
     site = imported(extract.write(tmp_path), **HOUSE_1)
-    assert [each.place for each in site.buildings] == ["way 1"]
+    assert [building.place for building in site.buildings] == ["way 1"]
 
 
 def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
@@ -158,7 +158,9 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
     extract.way(5, rectangle(12, 2, 4, 4), **{"building:part": "yes"})
     extract.street()
     site = imported(extract.write(tmp_path), protect=("Hall",))
-    found = {each.place: (each.height_m, each.outline.area) for each in site.buildings}
+    found = {
+        building.place: (building.height_m, building.outline.area) for building in site.buildings
+    }
     assert {place: height_m for place, (height_m, _) in found.items()} == {
         "way 3": 30.0,
         "way 4": 6.0,
@@ -166,9 +168,9 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
     assert [area for _, area in found.values()] == pytest.approx([100.0, 100.0], rel=0.01)
     assert places(entries(site, Fate.MERGED, "small or without a height")) == ["way 5"]
     assert places(entries(site, Fate.MERGED, "parts above their building, covered")) == ["way 1"]
-    assert all(each.protected for each in site.buildings)
-    assert len({each.building for each in site.scenario.structures}) == 1
-    weights = sum(each.weight for each in site.scenario.structures if each.protected)
+    assert all(building.protected for building in site.buildings)
+    assert len({structure.building for structure in site.scenario.structures}) == 1
+    weights = sum(structure.weight for structure in site.scenario.structures if structure.protected)
     assert weights == pytest.approx(1.0, abs=1e-5)
 
 
@@ -190,7 +192,7 @@ def test_heights_as_people_write_them(
     site = imported(written(tmp_path, house, PLACE))
     assert site.buildings[0].height_m == height_m
     guesses = site.ledger.of(Fate.GUESSED)
-    assert [words in each.kind for each in guesses if words] == ([True] if words else [])
+    assert [words in entry.kind for entry in guesses if words] == ([True] if words else [])
     assert words is not None or not guesses
 
 
@@ -201,7 +203,7 @@ def test_roofs_are_open_below_and_cellars_are_left_out(tmp_path: Path) -> None:
     extract.way(5, rectangle(20, 12, 9, 9), amenity="parking", parking="underground")
     extract.way(6, rectangle(40, 12, 9, 9), amenity="parking", parking="surface")
     site = imported(extract.write(tmp_path), **HOUSE_1)
-    (roof,) = (each for each in site.buildings if each.place == "way 3")
+    (roof,) = (building for building in site.buildings if building.place == "way 3")
     assert (roof.base_m, roof.height_m) == (4.0, 4.5)
     assert places(entries(site, Fate.GUESSED, "open below")) == ["way 3"]
     assert places(entries(site, Fate.LEFT_OUT, "below the ground")) == ["way 4"]
@@ -214,7 +216,9 @@ def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) 
     tower = outline(rectangle(12, 2, 4, 4), height=12.0)
     hidden = outline(rectangle(10, 4, 6, 6), height=2.0)
     site = imported(written(tmp_path, HOUSE, low, tower, hidden, PLACE), protect=("House",))
-    found = {each.place: (each.height_m, each.outline.area) for each in site.buildings}
+    found = {
+        building.place: (building.height_m, building.outline.area) for building in site.buildings
+    }
     assert found == {
         "features[0]": (6.0, 24.0),
         "features[1]": (3.0, 84.0),
@@ -228,7 +232,7 @@ def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
     ruin = outline(rectangle(0, 0, 6, 4), building="ruins")
     thin = outline(rectangle(10, 0, 0.2, 30), name="Screen")
     site = imported(written(tmp_path, HOUSE, ruin, thin, PLACE))
-    assert [each.place for each in site.buildings] == ["features[0]"]
+    assert [building.place for building in site.buildings] == ["features[0]"]
     assert places(entries(site, Fate.MERGED, "covered")) == ["features[1]"]
     assert places(entries(site, Fate.LEFT_OUT, "centre of no module")) == ["features[2]"]
 
@@ -260,15 +264,15 @@ def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: P
     shed = outline(rectangle(72, 20, 4, 4), name="Shed")
     garage = outline(rectangle(84, 20, 6, 6), building="garages", name="Garages")
     path = written(tmp_path, HOUSE, *row, unprotected, shed, garage, PLACE)
-    heights = {each.title: each.height_m for each in imported(path).buildings}
+    heights = {building.title: building.height_m for building in imported(path).buildings}
     assert (heights["Bare"], heights["Shed"], heights["Garages"]) == (8.0, 3.0, 3.0)
     low = imported(path, low_heights=True)
-    assert {each.title: each.height_m for each in low.buildings}["Bare"] == 6.0
-    (guess,) = (each for each in imported(path).ledger.of(Fate.GUESSED) if each.name == "Bare")
+    assert {building.title: building.height_m for building in low.buildings}["Bare"] == 6.0
+    (guess,) = (entry for entry in imported(path).ledger.of(Fate.GUESSED) if entry.name == "Bare")
     assert "unsafe side" in guess.kind
     assert guess.detail == "8.0 m as 5 neighbours, low 6.0 m"
     same = imported(path, default_height_m=5.0)
-    assert {each.title: each.height_m for each in same.buildings}["Bare"] == 5.0
+    assert {building.title: building.height_m for building in same.buildings}["Bare"] == 5.0
 
 
 def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
@@ -283,8 +287,8 @@ def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
 
 
 def kerbs_m(site: SiteImport) -> list[float]:
-    sources = (each for each in site.scenario.charge if not isinstance(each, RectangleSource))
-    return [each.lines_m[0][0][1] for each in sources]
+    sources = (source for source in site.scenario.charge if not isinstance(source, RectangleSource))
+    return [source.lines_m[0][0][1] for source in sources]
 
 
 def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
@@ -378,7 +382,7 @@ def test_names_of_the_map_stay_titles_and_become_latin_ids(
     assert (structure.name, structure.title) == (name, title)
     assert f"{name} ({named(title)})" in error_of(path)
     assert site.scenario.title_of(name) == title
-    (label,) = (each.label for each in site_features(site.scenario) if each.name == name)
+    (label,) = (feature.label for feature in site_features(site.scenario) if feature.name == name)
     assert label.startswith(title)
     assert site.scenario.content_hash == retitled(site.scenario).content_hash
 
@@ -422,7 +426,7 @@ def test_entities_on_layer_0_of_a_block_have_the_layer_of_the_insert(tmp_path: P
     document.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=of_layer("HOUSES"))
     document.saveas(path)
     site = imported(path, **DRAWN)
-    assert [each.outline.area for each in site.buildings] == [24.0]
+    assert [building.outline.area for building in site.buildings] == [24.0]
     assert len(entries(site, Fate.PASSED, "layer TREES")) == 1
 
 
@@ -442,11 +446,15 @@ def test_blocks_in_stretched_and_turned_blocks_keep_layers_and_shapes(
     document.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=placed)
     document.saveas(path)
     site = imported(path, **DRAWN | {"charge_at": ((-15.0, -10.0),), "margin_m": 30.0})
-    areas = sorted(each.outline.area for each in site.buildings)
+    areas = sorted(building.outline.area for building in site.buildings)
     assert areas == pytest.approx([24.0 * stretch, 9.0 * np.pi * stretch], rel=0.02)
     skewed = shapely.affinity.rotate(shapely.box(0, 0, 6, 4), turn_deg, origin=(0, 0))
     skewed = shapely.affinity.scale(skewed, stretch, 1.0)
-    lengths = [each.outline.length for each in site.buildings if len(each.polygons[0].walls) == 4]
+    lengths = [
+        building.outline.length
+        for building in site.buildings
+        if len(building.polygons[0].walls) == 4
+    ]
     assert lengths == pytest.approx([skewed.length], rel=1e-3)
     assert not entries(site, Fate.LEFT_OUT, "")
 
@@ -476,7 +484,7 @@ def test_outlines_with_a_gap_are_closed_and_named(gap: float, tmp_path: Path) ->
     assert alone.detail == f"{1000 * gap:.1f} mm"
     together = entries(site, Fate.CLOSED, "lines joined to outlines")
     assert len(together) == 4
-    assert any(f"{1000 * gap:.1f} mm bridged" in each.detail for each in together)
+    assert any(f"{1000 * gap:.1f} mm bridged" in entry.detail for entry in together)
 
 
 def test_lines_joined_to_an_outline_keep_what_they_say(tmp_path: Path) -> None:
@@ -498,7 +506,7 @@ def test_hatch_with_a_hole_and_an_inner_outline_are_courtyards(tmp_path: Path) -
         space.add_lwpolyline(shape, close=True, dxfattribs=of_layer("HOUSES"))
     document.saveas(path)
     site = imported(path, **DRAWN)
-    assert [each.outline.area for each in site.buildings] == [104.0, 104.0]
+    assert [building.outline.area for building in site.buildings] == [104.0, 104.0]
     assert len(entries(site, Fate.GUESSED, "taken as courtyards")) == 1
 
 
@@ -535,8 +543,8 @@ def test_meshes_have_a_footprint_and_their_heights(tmp_path: Path) -> None:
     space.add_polyface(dxfattribs=of_layer("HOUSES")).append_faces(moved)
     document.saveas(path)
     found = [
-        (each.outline.area, each.base_m, each.height_m)
-        for each in imported(path, **DRAWN).buildings
+        (building.outline.area, building.base_m, building.height_m)
+        for building in imported(path, **DRAWN).buildings
     ]
     assert found == [(24.0, 1.0, 7.0), (24.0, 1.0, 7.0)]
 
@@ -551,7 +559,7 @@ def test_what_a_drawing_has_of_no_outline_is_named(tmp_path: Path) -> None:
     space.add_mline([(20, 0), (30, 0)], dxfattribs=of_layer("HOUSES"))
     document.saveas(path)
     site = imported(path, **DRAWN)
-    kinds = {each.kind for each in site.ledger.of(Fate.LEFT_OUT)}
+    kinds = {entry.kind for entry in site.ledger.of(Fate.LEFT_OUT)}
     assert {
         "references to other files, or to blocks that are not there",
         "entities of the type XLINE",
@@ -570,7 +578,7 @@ def test_scale_of_0_is_1(tmp_path: Path) -> None:
         path.read_text().replace(" 41\n3.0\n", " 41\n0.0\n").replace(" 43\n3.0\n", " 43\n0.0\n")
     )
     site = imported(path, **DRAWN)
-    assert [each.outline.area for each in site.buildings] == [24.0]
+    assert [building.outline.area for building in site.buildings] == [24.0]
     assert len(entries(site, Fate.GUESSED, "scale of 0")) == 2
 
 
@@ -691,14 +699,14 @@ def test_every_object_is_on_the_ledger_or_on_the_site(
 ) -> None:
     """Each object is read or has a reason; what is read as a building stands on the site."""
     house = outline(rectangle(50, 0, 8, 6), name="House", height=6.0, protected=True)
-    features = [house, charge(64.0, 3.0), *(shaped(*each) for each in drawn)]
+    features = [house, charge(64.0, 3.0), *(shaped(*shape) for shape in drawn)]
     path = written(tmp_path_factory.mktemp("maps"), *features)
     part: dict[str, Any] = {"origin": (20.0, -5.0), "size_m": (50.0, 30.0)} if cut else {}
     site = imported(path, protect=("House",), **part)
-    fates = Counter(each.place for each in site.ledger.of(*FATES))
+    fates = Counter(entry.place for entry in site.ledger.of(*FATES))
     assert fates == Counter(f"features[{k}]" for k in range(len(features)))
-    read = {each.place for each in site.ledger.of(Fate.READ) if each.kind == "building"}
-    assert read == {each.place for each in site.buildings}
+    read = {entry.place for entry in site.ledger.of(Fate.READ) if entry.kind == "building"}
+    assert read == {building.place for building in site.buildings}
     assert not entries(site, Fate.LEFT_OUT, "of no use")
 
 
@@ -777,7 +785,10 @@ def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> 
     extract.relation(6, members, type="building")
     extract.street()
     site = imported(extract.write(tmp_path), protect=("Hall",))
-    assert {each.place: each.height_m for each in site.buildings} == {"way 3": 30.0, "way 4": 6.0}
+    assert {building.place: building.height_m for building in site.buildings} == {
+        "way 3": 30.0,
+        "way 4": 6.0,
+    }
 
 
 @given(st.lists(st.tuples(SHAPES, KINDS), max_size=10))
@@ -793,7 +804,7 @@ def test_every_way_of_an_extract_is_on_the_ledger(
         else:
             extract.way(number, rectangle(x, y, side, side), **tags)
     site = imported(extract.write(tmp_path_factory.mktemp("maps")), **HOUSE_1)
-    fates = Counter(each.place for each in site.ledger.of(*FATES))
+    fates = Counter(entry.place for entry in site.ledger.of(*FATES))
     tagged = [f"way {number}" for number, (_, tags) in zip(numbers, drawn, strict=True) if tags]
     assert fates == Counter(["way 1", "way 2", *tagged])
 
@@ -832,5 +843,5 @@ def test_every_entity_of_a_drawing_is_on_the_ledger(
         handles.append(make[kind]().dxf.handle)
     document.saveas(path)
     site = imported(path, **DRAWN)
-    fates = Counter(each.place.split()[1] for each in site.ledger.of(*FATES))
+    fates = Counter(entry.place.split()[1] for entry in site.ledger.of(*FATES))
     assert fates == Counter([space[0].dxf.handle, *handles])

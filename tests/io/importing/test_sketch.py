@@ -24,7 +24,7 @@ def test_a_click_on_a_building_protects_it() -> None:
         assert 0 <= y_px <= height_px
         place = view.place(round(x_px), round(y_px))
         site = import_site(BLOCK, ImportOptions(protect_near=place, size_m=(80, 80), centre=place))
-        (chosen,) = (each for each in site.buildings if each.protected)
+        (chosen,) = (building for building in site.buildings if building.protected)
         assert chosen.outline.contains(shapely.Point(40.0, 40.0).buffer(1.0))
 
 

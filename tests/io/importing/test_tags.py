@@ -32,16 +32,16 @@ def case(name: str, **options: Any) -> SiteImport:
 
 
 def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
-    return tuple(each for each in site.ledger.of(fate) if words in each.kind)
+    return tuple(entry for entry in site.ledger.of(fate) if words in entry.kind)
 
 
 def places(site: SiteImport, fate: Fate, words: str) -> list[str]:
-    return [each.place for each in entries(site, fate, words)]
+    return [entry.place for entry in entries(site, fate, words)]
 
 
 def heights(site: SiteImport) -> dict[str, tuple[float, float | None]]:
     """Return underside and top of each building by its place in the file, m."""
-    return {each.place: (each.base_m, each.height_m) for each in site.buildings}
+    return {building.place: (building.base_m, building.height_m) for building in site.buildings}
 
 
 def of_map(folder: Path, *features: dict[str, Any], **options: Any) -> SiteImport:
@@ -66,7 +66,7 @@ def refusal(path: Path, **options: Any) -> str:
 
 
 def segments(scenario: Scenario) -> list[SegmentSource]:
-    return [each for each in scenario.charge if isinstance(each, SegmentSource)]
+    return [source for source in scenario.charge if isinstance(source, SegmentSource)]
 
 
 # The kind of a building comes from `building`.
@@ -229,7 +229,7 @@ def test_a_unit_of_heights_is_that_of_numbers_without_one(tmp_path: Path) -> Non
     site = of_map(tmp_path, features[0], tank, height_unit="ft")
     assert heights(site)["features[2]"] == (3.0, 12.0)
     assert site.buildings[-1].outline.bounds[2] > 0.0
-    (round_one,) = (each for each in site.buildings if each.place == "features[3]")
+    (round_one,) = (building for building in site.buildings if building.place == "features[3]")
     assert round_one.outline.area == pytest.approx(3.14 * (16.5 * FOOT_M) ** 2, rel=0.05)
     assert heights(of_map(tmp_path, features[1], height_unit="ft"))["features[2]"] == (3.0, 12.0)
     assert "--height-unit is 'yards', must be one of m, mm, cm, dm, km, in, ft" in refusal(
@@ -302,7 +302,7 @@ def test_a_mass_in_a_text_is_that_mass(tmp_path: Path) -> None:
         place = charge(25.0, 5.0)
         place["properties"]["tnt_kg"] = mass
         site = import_site(written(tmp_path, HOUSE, place))
-        assert [each.tnt_kg for each in site.scenario.charge] == [expected_kg]
+        assert [source.tnt_kg for source in site.scenario.charge] == [expected_kg]
         said = entries(site, Fate.GUESSED, "masses that cannot be read")
         assert bool(said) is (mass in (True, "much"))
 
@@ -313,11 +313,11 @@ def test_a_mass_in_a_text_is_that_mass(tmp_path: Path) -> None:
 def test_overture_has_its_own_names_for_buildings_parts_and_roads() -> None:
     site = case("g_overture.geojson")
     assert heights(site) == {"features[0]": (0.0, 12.0), "features[2]": (0.0, 20.0)}
-    areas = {each.place: each.outline.area for each in site.buildings}
+    areas = {building.place: building.outline.area for building in site.buildings}
     assert areas == pytest.approx({"features[0]": 175.0, "features[2]": 25.0}, rel=0.01)
-    assert {each.title for each in site.buildings} == {"Court"}
-    assert all(each.protected for each in site.buildings)
-    assert len({each.building for each in site.scenario.structures}) == 1
+    assert {building.title for building in site.buildings} == {"Court"}
+    assert all(building.protected for building in site.buildings)
+    assert len({structure.building for structure in site.scenario.structures}) == 1
     assert places(site, Fate.LEFT_OUT, "below the ground") == ["features[1]"]
     assert places(site, Fate.READ, "place of a charge") == ["features[3]"]
 
@@ -338,7 +338,7 @@ def test_names_of_overture_may_be_a_table_or_its_text(
     properties: dict[str, Any], tmp_path: Path
 ) -> None:
     site = of_map(tmp_path, overture(**properties))
-    (mill,) = (each for each in site.buildings if each.place == "features[2]")
+    (mill,) = (building for building in site.buildings if building.place == "features[2]")
     assert (mill.title, mill.base_m, mill.height_m) == ("Mill", 0.0, 9.0)
 
 
@@ -355,8 +355,8 @@ def test_a_part_of_overture_belongs_to_the_building_that_it_names(tmp_path: Path
         "properties": {"id": "c", "building_id": "a", "is_underground": False, "height": 15.0}
     }
     site = of_map(tmp_path, own, part)
-    assert {each.title for each in site.buildings} == {"House", "Own"}
-    groups = {each.place: each.group for each in site.buildings}
+    assert {building.title for building in site.buildings} == {"House", "Own"}
+    groups = {building.place: building.group for building in site.buildings}
     assert groups["features[3]"] == groups["features[2]"] == "features[2]"
     alone = of_map(tmp_path, part)
     assert heights(alone)["features[2]"] == (0.0, 15.0)
@@ -403,7 +403,7 @@ TAGS = {"building": "yes", "height": "12", "name": 'Mill "A"'}
         {"tags": TAGS},
         {"tags": json.dumps(TAGS)},
         {"tags": [{"key": key, "value": value} for key, value in TAGS.items()]},
-        {"tags": [list(each) for each in TAGS.items()]},
+        {"tags": [list(tag) for tag in TAGS.items()]},
         {"building": "yes", "other_tags": r'"height"=>"12","name"=>"Mill \"A\""'},
         {"osm": TAGS},
         {"Tags": TAGS, "height": 3.0},
@@ -411,7 +411,7 @@ TAGS = {"building": "yes", "height": "12", "name": 'Mill "A"'}
 )
 def test_every_form_of_nested_tags(properties: dict[str, Any], tmp_path: Path) -> None:
     site = of_map(tmp_path, bare(**properties))
-    (mill,) = (each for each in site.buildings if each.place == "features[2]")
+    (mill,) = (building for building in site.buildings if building.place == "features[2]")
     assert (mill.height_m, mill.title) == (12.0, 'Mill "A"')
 
 
@@ -453,7 +453,7 @@ def test_a_court_stands_once_whichever_of_its_objects_have_tags(
     relation: dict[str, str], way: dict[str, str], height_m: float, read: str, tmp_path: Path
 ) -> None:
     site = court(tmp_path, relation, **way)
-    found = {each.place: each for each in site.buildings}
+    found = {building.place: building for building in site.buildings}
     assert found.keys() == {"way 1", read}
     assert found[read].outline.area == pytest.approx(300.0, rel=0.01)
     assert found[read].height_m == height_m
@@ -463,14 +463,14 @@ def test_a_court_stands_once_whichever_of_its_objects_have_tags(
 def test_a_tower_on_a_podium_is_no_double(tmp_path: Path) -> None:
     """A ring of 12 m around a hall of 6 m: the map says so."""
     site = court(tmp_path, {"building": "yes", "height": "12"}, building="yes", height="6")
-    areas = {each.place: each.outline.area for each in site.buildings}
+    areas = {building.place: building.outline.area for building in site.buildings}
     assert areas["relation 5"] == pytest.approx(300.0, rel=0.01)
     assert areas["way 10"] == pytest.approx(100.0, rel=0.01)
 
 
 def test_the_same_outline_twice_is_one_building_with_the_words_of_both(tmp_path: Path) -> None:
     site = of_map(tmp_path, bare(building="yes"), beside(name="Mill", building="industrial"))
-    (mill,) = (each for each in site.buildings if each.place == "features[2]")
+    (mill,) = (building for building in site.buildings if building.place == "features[2]")
     assert (mill.title, mill.height_m) == ("Mill", 9.0)
     assert places(site, Fate.MERGED, "drawn twice") == ["features[3]"]
     assert not site.ledger.of(Fate.GUESSED)
@@ -488,7 +488,7 @@ def test_rings_in_several_ways_and_relations_without_a_type(tmp_path: Path) -> N
     extract.relation(6, [(13, "outer")], type="", building="yes", height="12")
     extract.relation(7, [(13, "inner")], building="yes", height="12")
     site = import_site(extract.write(tmp_path), ImportOptions(protect=("House",)))
-    areas = {each.place: each.outline.area for each in site.buildings}
+    areas = {building.place: building.outline.area for building in site.buildings}
     assert areas["relation 5"] == pytest.approx(300.0, rel=0.01)
     assert places(site, Fate.LEFT_OUT, "no outlines") == ["relation 6"]
     assert places(site, Fate.LEFT_OUT, "without an outer ring") == ["relation 7"]
@@ -499,7 +499,7 @@ def test_a_part_beyond_its_building_is_whole(tmp_path: Path) -> None:
         "properties": {"building:part": "yes", "height": 15.0}
     }
     site = of_map(tmp_path, beside(name="Mill"), part)
-    areas = {each.place: each.outline.area for each in site.buildings}
+    areas = {building.place: building.outline.area for building in site.buildings}
     assert areas == {"features[0]": 200.0, "features[2]": 170.0, "features[3]": 48.0}
 
 
@@ -530,7 +530,7 @@ def test_positions_in_members_of_relations_are_read(separate: bool, tmp_path: Pa
         for way, role in ((10, "outer"), (11, "inner"))
     )
     if separate:
-        extract.others += [f'<way id="{way}">{bounds}{each}</way>' for way, each in sides.items()]
+        extract.others += [f'<way id="{way}">{bounds}{side}</way>' for way, side in sides.items()]
     tags = "".join(
         f'<tag k="{key}" v="{value}"/>'
         for key, value in {"type": "multipolygon", "building": "yes", "height": "12"}.items()
@@ -539,7 +539,7 @@ def test_positions_in_members_of_relations_are_read(separate: bool, tmp_path: Pa
     extract.others.append(f'<relation id="5">{bounds}{node}{members}{tags}</relation>')
     extract.others.append('<way id="20"><center lat="0" lon="0"/><tag k="building" v="yes"/></way>')
     site = import_site(extract.write(tmp_path), ImportOptions(protect=("House",)))
-    areas = {each.place: each.outline.area for each in site.buildings}
+    areas = {building.place: building.outline.area for building in site.buildings}
     assert areas["relation 5"] == pytest.approx(300.0, rel=0.01)
     assert places(site, Fate.LEFT_OUT, "fewer than two nodes") == ["way 20"]
 
@@ -558,7 +558,7 @@ def test_objects_that_are_not_visible_are_not_there(tmp_path: Path) -> None:
     extract = town()
     extract.way(3, rectangle(30, 0, 8, 6), 'visible="false"', building="yes", height="9")
     site = import_site(extract.write(tmp_path), ImportOptions(protect=("House",)))
-    assert [each.place for each in site.buildings] == ["way 1"]
+    assert [building.place for building in site.buildings] == ["way 1"]
 
 
 # Streets through buildings.
@@ -566,11 +566,13 @@ def test_objects_that_are_not_visible_are_not_there(tmp_path: Path) -> None:
 
 def mouths_m(site: SiteImport) -> list[shapely.Point]:
     """Return the ends of all places of charges."""
-    found = [shapely.Point(end) for each in segments(site.scenario) for end in each.lines_m[0]]
+    found = [
+        shapely.Point(end) for segment in segments(site.scenario) for end in segment.lines_m[0]
+    ]
     found += [
-        shapely.Point(each.position_m)
-        for each in site.scenario.charge
-        if isinstance(each, PointSource)
+        shapely.Point(source.position_m)
+        for source in site.scenario.charge
+        if isinstance(source, PointSource)
     ]
     return found
 
@@ -607,7 +609,7 @@ def test_a_passage_may_end_where_the_building_does(
 def test_a_drive_into_a_building_has_one_mouth(tmp_path: Path) -> None:
     drive = line([(10, 5), (10, 0)], highway="service", width="2", tunnel="building_passage")
     site = of_map(tmp_path, drive, rotation_deg=0.0)
-    (mouth,) = (each for each in site.scenario.charge[1:] if isinstance(each, PointSource))
+    (mouth,) = (source for source in site.scenario.charge[1:] if isinstance(source, PointSource))
     _, bottom, _, _ = site.buildings[0].outline.bounds
     assert bottom - 1.0 < mouth.position_m[1] < bottom
 

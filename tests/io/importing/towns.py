@@ -228,7 +228,7 @@ def sides(draw: st.DrawFn) -> list[Item]:
     tags = {"building": "yes", "height": 9.0}
     lines = [shapely.LineString(ends) for ends in pairwise(corners)]
     chief = Item(lines[0], tags, Fate.READ, (shape.area, 0.0, 9.0))
-    return [chief, *(Item(each, tags, Fate.MERGED) for each in lines[1:])]
+    return [chief, *(Item(line, tags, Fate.MERGED) for line in lines[1:])]
 
 
 def passage() -> list[Item]:
@@ -297,7 +297,7 @@ def as_geojson(town: Town, folder: Path) -> tuple[Path, dict[str, tuple[Item, bo
     }
     path = folder / "town.geojson"
     path.write_text(json.dumps(document))
-    return path, {f"features[{k}]": each for k, each in enumerate(town.items)}
+    return path, {f"features[{k}]": item for k, item in enumerate(town.items)}
 
 
 def as_osm(town: Town, folder: Path) -> tuple[Path, dict[str, tuple[Item, bool]]]:
