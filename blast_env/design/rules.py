@@ -97,6 +97,7 @@ def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
         f"between {'the mean place of the charges' if several else 'the charge'}, "
         f"({x_m:.1f}, {y_m:.1f}) m, and the protected structures"
     )
+    # 1. The lines of sight do not cross the build zone.
     cells = _between(placement.scenario, place_m)
     if not cells.any():
         around = (
@@ -106,6 +107,7 @@ def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
         )
         why = next(around, "")
         return f"the build zone has no cell {way}{why}{': choose one charge' if several else ''}"
+    # 2. They do, but cells there are not usable.
     reasons = placement.reasons_against(cells)
     free = np.argwhere(cells & placement.usable)
     text = f"of {cells.sum()} cells {way}, {cells.sum() - len(free)} are not usable"
@@ -114,6 +116,7 @@ def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
         text += f" ({reasons[most]}: each {most})"
     if not len(free):
         return text
+    # 3. Some are usable, but no item fits: the reason on the first one.
     row, column = free[0].tolist()
     against = placement.explain(placement.catalogue.element_at(0, row, column))
     why = against or "it would reach beyond them"

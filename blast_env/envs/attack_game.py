@@ -114,6 +114,8 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):  # type: ignore[misc]  # unt
         cache: str | Path | BlastStore | None = None,
     ) -> None:
         super().__init__()
+        # The defender places in the environment itself, whose engine runs no blast: the game sets
+        # off the charge that the attacker chose.
         self.placing = BlastBarrierEnv(
             scenario,
             observation="features",

@@ -517,6 +517,8 @@ class Episodes:
         Raises:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
         """
+        # 1. The layouts of each episode, each once: those that a reward of turns compares, and at
+        # the end the final one and the empty site.
         wanted: dict[int, dict[Layout, None]] = {}
         if self._of_turns is not None:
             for index, turn in self._turns.items():
@@ -525,6 +527,7 @@ class Episodes:
             final = self.running[index].final
             assert final is not None
             wanted.setdefault(index, {}).update({final: None, (): None})
+        # 2. Without those known: of the episode, and of the empty site from an earlier one.
         due = [
             (self.running[index], layout)
             for index, layouts in wanted.items()
@@ -534,6 +537,7 @@ class Episodes:
         ]
         if not due:
             return
+        # 3. One batch of blasts, and the loads back to their episodes in the same order.
         asked = [
             (episode.evaluator, layout, threat)
             for episode, layout in due

@@ -189,9 +189,11 @@ def _blasts_of(
             for threat in request.case.threats
             for layout in request.layouts.values()
         ]
+        # One batch for all campaigns on a scenario, so that no process waits at the end of each.
         part = share_of(progress, done, len(campaigns), len(together))
         first = together[0]
         records = iter(first.evaluator.records_of_many(pairs, first.processes, part, drawing))
+        # Records come in the order of the pairs: threats outside, layouts inside.
         for request in together:
             own: dict[str, list[BlastRecord]] = {name: [] for name in request.layouts}
             for threat in request.case.threats:

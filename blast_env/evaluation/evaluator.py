@@ -168,6 +168,7 @@ class BlastEvaluator:
         if not self.engine.is_complete:
             return list(map(BlastRecord, self.loads_of_many(pairs, processes, progress)))
         asked, keys, layouts = self._asked(pairs, processes)
+        # 1. What is stored. A drawing needs the blast itself, so then all of them run.
         stored = (
             {}
             if drawing is not None
@@ -179,6 +180,7 @@ class BlastEvaluator:
             for key, charge in asked.items()
             if key not in found
         }
+        # 2. The others; a drawing stays in this process, because it collects pictures here.
         if processes > 1 and drawing is None:
             ran = as_completed(self.engine.record, list(missing.values()), processes)
         else:
@@ -187,6 +189,7 @@ class BlastEvaluator:
                 (number, self.engine.record(blast, parts[number], drawing))
                 for number, blast in enumerate(missing.values())
             )
+        # 3. Each is kept when it has run, so that an interruption loses only those under way.
         names = list(missing)
         for done, (number, record) in enumerate(ran, start=1):
             found[names[number]] = record
@@ -194,6 +197,7 @@ class BlastEvaluator:
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(missing))
         self.counts.cache_hits += len(keys) - len(missing)
+        # 4. Measures need no blast: one record answers for its layout with any of them.
         return [
             replace(found[key], loads=self.responding(found[key].loads, layout))
             for key, layout in zip(keys, layouts, strict=True)

@@ -222,15 +222,18 @@ class StudyPlan:
         sizes: list[Blasts] = []
         name = _PLACES
         try:
+            # 1. The worst of many places are the threats, unless these are given.
             if not asked:
                 places = self._run(self.places, progress)
             threats = asked if places is None else self._worst_of(places)
+            # 2. The coarser cells first: after an interruption they are a result.
             for engine in dict.fromkeys(self.options.engines):
                 name = engine.cell_words
                 for part, threat in zip(self.threats(threats, engine), threats, strict=True):
                     drawn = drawing(threat) if drawing is not None and part.is_drawn else None
                     self._run(part, progress, drawn)
                 sizes.append(self._campaign(self._both, threats, engine).run())
+            # 3. The items, and the places if they were not needed before.
             name = _ITEMS
             if self.options.items:
                 items = self._run(self.items(threats), progress)

@@ -290,6 +290,8 @@ class GasSolver:
             least = values[air].min(initial=np.inf)
             if not least > 0.0:
                 raise BlastEnvError(f"{name} falls to {least}, but must be above 0 everywhere")
+        # In units of the still air, where its density and pressure are 1:
+        # E = p / (gamma - 1) + rho v^2 / 2.
         density = density / self.density_kg_m3
         pressure = pressure / self.pressure_pa
         energy = pressure / (GAMMA - 1.0)
@@ -364,6 +366,8 @@ class GasSolver:
             pressure_pa=self.pressure_pa,
             density_kg_m3=self.density_kg_m3,
         )
+        # First fine layer of each coarse one, by axis: pairs in the grid, single ones in its
+        # buffers and the margin, which keep their number.
         starts = []
         for axis in range(3):
             low, high = self.grid.buffer_layers_by_axis[axis]
@@ -432,6 +436,8 @@ class GasSolver:
         """Move the gas along one or two axes; return the number of cells."""
         own = [axis for axis in axes if axis >= 0]
         if self._skip:
+            # What moves loads at most the next cell in a sweep; all beyond is still air, and is
+            # left out.
             for axis in own:
                 state.widen(self.extent, self._whole, axis)
 

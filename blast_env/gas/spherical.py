@@ -95,6 +95,7 @@ class SphericalBlast:
             raise BlastEnvError(
                 f"shells is {shells}, but must be even and at least {2 * CHARGE_SHELLS}"
             )
+        # The sphere of this mass and density is CHARGE_SHELLS shells thick, whatever its size.
         radius_m = (3.0 * mass_kg / (4.0 * pi * density_kg_m3)) ** (1.0 / 3.0)
         self._gauges_m = np.atleast_1d(np.asarray(gauges_m, dtype=np.float64))
         if self._gauges_m.min(initial=inf) < radius_m:
@@ -105,6 +106,7 @@ class SphericalBlast:
         self.state: Floats = np.zeros((4, shells))
         self.state[DENSITY] = AIR_DENSITY_KG_M3
         self.state[ENERGY] = AIR_PRESSURE_PA / (GAMMA - 1.0)
+        # The charge is gas at rest: its energy comes on top of that of the air in its place.
         inside = slice(0, CHARGE_SHELLS)
         self.state[DENSITY, inside] = self.state[PRODUCTS, inside] = density_kg_m3
         self.state[ENERGY, inside] += density_kg_m3 * prompt_j_kg

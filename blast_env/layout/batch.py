@@ -109,6 +109,7 @@ class LayoutBatch:
             return
         catalogue = rules.catalogue
         table = np.zeros(self.table.shape[1:], dtype=np.int8)
+        # 1. The layout as arrays. Stock is counted for the zone, and behind it for each item.
         left = np.array([start.stock_left, *catalogue.stocks])
         numbers = [catalogue.action(element) for element in start.layout]
         for element in start.layout:
@@ -118,9 +119,11 @@ class LayoutBatch:
                 left[1 + catalogue.variants[number].item] -= 1
         if not catalogue.has_items:
             left[1] = start.stock_left
+        # 2. Room for as many elements as the new site has in stock.
         more = rules.zone.stock - self._numbers.shape[1]
         if more > 0:
             self._numbers = np.pad(self._numbers, ((0, 0), (0, more)))
+        # 3. The rows of the layouts that begin anew.
         rows = slice(None) if len(indices) == len(self.rules) else indices
         self.legal[rows], self.occupancy[rows] = start.legal, start.occupancy
         self.table[rows], self.left[rows] = table, left

@@ -163,6 +163,7 @@ def advised(
     kinds, found = kinds_for(judge.scenario), list[Advice]()
     margin = MARGIN if judge.scenario.objective.target_probability is None else _PROBABLE_MARGIN
     for number, kind in enumerate(kinds):
+        # All measures together begin with what each kind found, so that they are never worse.
         first = tuple(advice.layout for advice in found) if kind is MeasureKind.TOGETHER else ()
         part = share_of(progress, number, len(kinds))
         found.append(

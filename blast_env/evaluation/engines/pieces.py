@@ -103,16 +103,19 @@ class PieceLoads:
         if not bodied:
             return None
         elements, bodies = zip(*bodied, strict=True)
+        # 1. The piece on each cell of the zone.
         owner = np.full(zone.shape, -1)
         for index, element in enumerate(elements):
             for cell in zone.catalogue.cells(element):
                 owner[cell] = index
         table = run.table
         barrier = next(k for k, structure in enumerate(run.site.structures) if structure.is_barrier)
+        # 2. The sides that count: two opposite ones for each axis along which a piece is loaded.
         ways = tuple(_ways(scenario, elements, run.grid.cell_m))
         pushed = np.zeros((len(elements), len(WALLS)), dtype=bool)
         for way in ways:
             pushed[way.piece, way.low : way.low + 2] = True
+        # 3. The faces of the barrier on those sides; those of one piece and side share a patch.
         own = np.flatnonzero((table.structure == barrier) & (table.face < len(WALLS)))
         piece = owner[table.row[own], table.column[own]]
         own, piece = own[piece >= 0], piece[piece >= 0]

@@ -78,6 +78,7 @@ def mass_near(judged: Consequences, level: LevelOfProtection) -> tuple[float, bo
 
 def _most_kept(keeps: Callable[[float], bool], kept: float, lost: float) -> float:
     """Return about the largest of the values that are kept, between one that is and one not."""
+    # The geometric mean, because severities are ratios.
     for _ in range(_BISECTIONS):
         middle = (kept * lost) ** 0.5
         kept, lost = (middle, lost) if keeps(middle) else (kept, middle)
@@ -137,6 +138,7 @@ class Ladder:
             off_m = stand_off_m(self.scenario.loaded_walls, charge.position_m)
             return Edge(charge, off_m, is_kept, is_end)
 
+        # 1. By blasts: the highest rung that keeps the level, and the next one, which loses it.
         low = 0
         while keeps(low) is False:
             low -= 1
@@ -148,6 +150,7 @@ class Ladder:
         if keeps(high) is None:
             return edge(_STEP**low, is_end=True)
 
+        # 2. Between the two, histories of the nearest blast are scaled, which takes no blast.
         def between(severity: float) -> bool:
             return self._near(severity, nearer).passes(level)
 

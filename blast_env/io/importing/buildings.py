@@ -111,6 +111,7 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     Parts that are small or without a height of their own are not kept; a building without a height
     has that of its lowest part. A part without a building is one.
     """
+    # 1. The building of each part: the one that it names, else the smallest that has most of it.
     wholes = [thing for thing in things if not thing.is_part]
     tree = shapely.STRtree([whole.geometry for whole in wholes])
     parts: dict[int, list[Thing]] = {}
@@ -127,6 +128,7 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
             site.ledger.add(Fate.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
         else:
             parts.setdefault(own, []).append(part)
+    # 2. Buildings with their parts: one group, which is protected as a whole.
     for index, whole in enumerate(wholes):
         own_parts = parts.get(index, [])
         lowest_m = min(
@@ -178,6 +180,7 @@ def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
             -building.geometry.area,
         ),
     )
+    # From the first of the order on, each keeps its ground, and those after it lose what it covers.
     tree = shapely.STRtree([building.geometry for building in order])
     found = [thing for thing in things if thing.carries]
     left = list(order)

@@ -132,12 +132,15 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> SiteI
 
 def _imported(path: Path, options: ImportOptions) -> SiteImport:
     site_map = read_map(path, options)
+    # 1. The objects with a role, in site metres.
     site = prepared(place_site(site_map, things_of(site_map)))
+    # 2. Buildings on the module grid; then charges and build zone, which keep clear of them.
     buildings = fit_buildings(site)
     simulation = SimulationSection(preset=_PRESET)
     radius_m = simulation.parameters.charge_radius_m
     sources, streets = charge_sources(site, buildings, radius_m)
     zone = build_zone(site, buildings)
+    # 3. The fate of every object of the file, once it is known what became of it.
     site_map.settle(
         {
             **dict.fromkeys(streets, str(Role.CHARGE)),
@@ -148,6 +151,7 @@ def _imported(path: Path, options: ImportOptions) -> SiteImport:
     ledger = site_map.ledger
     if options.strict:
         ledger.check_strict(path)
+    # 4. The scenario, which is checked as one from a file.
     notes = ledger.lines(CHANGES, MOST_NOTE)[:MOST_NOTES]
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,

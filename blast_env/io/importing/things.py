@@ -215,12 +215,14 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
     selectors, reader = _selectors(site_map), HeightReader.of(site_map)
     roles = [_role(feature, selectors, site_map) for feature in site_map.features]
     known = ("kind", "highway", "layer", *_BUILDING_KEYS)
+    # A map that marks nothing is a plain layer of outlines: buildings.
     if not selectors and not any(
         key in feature.tags for feature in site_map.features for key in known
     ):
         roles = [
             Role.BUILDING if _may_be_building(feature) else None for feature in site_map.features
         ]
+    # Parts may name their building by its id.
     wholes = {
         str(feature.tags["id"]): feature.place
         for feature, role in zip(site_map.features, roles, strict=True)
