@@ -68,11 +68,6 @@ class PlateState:
     principal: FloatArray
     weights: FloatArray
 
-    @property
-    def largest_stress(self) -> float:
-        """Largest principal stress on the face away from the load, sigma b^2 / (E h^2)."""
-        return float(self.principal[0, ..., 0].max())
-
 
 @dataclass(frozen=True)
 class Plate:

@@ -55,9 +55,6 @@ E1300: Final = (
 )
 """Least thickness (mm), sides (m), non-factored load (kPa): others' readings of E1300's charts."""
 
-_STIFFNESS_PA_M: Final = 1e6
-_STATIC_PA: Final = 1e3
-
 Row = tuple[str, ...]
 
 

@@ -1,7 +1,7 @@
 """The environment with two objectives, the load taken off and the cost of the barriers."""
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -10,9 +10,6 @@ from blast_env.arrays import FloatArray, IntArray
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutState
-
-OBJECTIVES: Final = ("reduction", "cost")
-"""The entries of the reward: share of the load taken off, minus the share of the budget spent."""
 
 
 class BlastBarrierTwoObjectivesEnv(BlastBarrierEnv):

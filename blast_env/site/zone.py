@@ -263,10 +263,6 @@ class BuildZone(Section):
         corner = self.cell_rectangle_m((row, column))[:2]
         return Rectangle.from_corner(corner, (columns * MODULE_SIDE_M, rows * MODULE_SIDE_M))
 
-    def cell_centre_m(self, cell: Cell) -> PointM:
-        """Return the centre of a cell, m."""
-        return self.cell_rectangle_m(cell).centre
-
     def has(self, cell: Cell) -> bool:
         """Return whether a cell lies in the grid."""
         return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns

@@ -61,7 +61,7 @@ def test_cells_are_measured_along_the_line_of_sight(charge_m: tuple[float, float
     middle_m = np.array(scenario.structures[0].rectangle_m.centre)
     unit = (middle_m - charge_m) / np.hypot(*(middle_m - charge_m))
     for cell in ((0, 0), (39, 0), (17, 15)):
-        offset_m = np.array(zone.cell_centre_m(cell)) - charge_m
+        offset_m = np.array(zone.cell_rectangle_m(cell).centre) - charge_m
         along_m, aside_m = offset_m @ unit, offset_m @ (-unit[1], unit[0])
         assert LENGTH_M * float(view.cells[0, *cell, ALONG]) == pytest.approx(along_m, abs=0.05)
         assert LENGTH_M * float(view.cells[0, *cell, ASIDE]) == pytest.approx(aside_m, abs=0.05)

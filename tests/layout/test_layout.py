@@ -50,7 +50,7 @@ def test_centres_of_cells_are_those_of_their_squares() -> None:
     x_m, y_m = zone.centres_m
     assert x_m.shape == zone.shape
     for cell in zone.cells():
-        assert (x_m[cell], y_m[cell]) == zone.cell_centre_m(cell)
+        assert (x_m[cell], y_m[cell]) == zone.cell_rectangle_m(cell).centre
 
 
 # --- Layout files: whatever is in them is either a layout for the scenario or a clear error.
