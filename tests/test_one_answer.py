@@ -138,10 +138,6 @@ class Asked:
         return done.stdout
 
 
-def lines_of(document: Document) -> Iterator[str]:
-    yield from (part.text() for part in document.parts if isinstance(part, Line))
-
-
 def rows_of(document: Document, title: str) -> list[tuple[str, ...]]:
     """Return the rows of the first table with a title."""
     tables = (part for part in document.parts if isinstance(part, Table))

@@ -469,51 +469,6 @@ def test_two_tabs_do_not_mix_and_a_second_server_is_refused(page: Page, server: 
         assert words in done.stderr
 
 
-def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
-    """Import, proposal, gas verdict and report by the page; the minutes are written down."""
-    began_s = monotonic()
-    stages: list[str] = []
-
-    def reached(stage: str) -> None:
-        stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
-
-    page.open()
-    page.upload(DATA / "pump_house.geojson")
-    page.sees("protected buildings")
-    page.fill("protected buildings", "Pump House")
-    page.fill("stock of modules", "8")
-    page.button("import").click()
-    page.sees("modules off by")
-    page.shoot("import_deviations")
-    page.button("use this site").click()
-    page.until(lambda: "/design/" in page.driver.current_url)
-    page.until(lambda: page.all(".be-plan svg text"))
-    reached("the site of the map")
-    page.choose("by", "rule: wall near the building")
-    page.button("Propose").click()
-    page.button("use it").click()
-    page.sees("8 of 8 modules")
-    reached("a layout by rule")
-    page.button("Blast").click()
-    page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 300.0)
-    page.shoot("map_verdict")
-    reached("the verdict of gas dynamics")
-    page.button("Save as").click()
-    sleep(0.5)
-    page.button("report on this layout (.html)").click()
-    page.sees("blasts of gas: about")
-    page.shoot("report_cost")
-    page.button("begin").click()
-    page.until(lambda: "wrote pump_house_A.html" in page.text(), 1800.0)
-    page.shoot("map_report_done")
-    page.button("download").click()
-    (report,) = page.until(lambda: [*(tmp_path / "downloads").glob("*.html")])
-    assert "<h3>Verdict</h3>" in report.read_text(encoding="utf-8")
-    reached("the report")
-    (PICTURES / "map_to_report.txt").write_text("\n".join(stages) + "\n")
-    assert not page.faults()
-
-
 def test_from_a_public_extract_to_the_verdict(page: Page) -> None:
     """A car park of OpenStreetMap by the page alone, on coarse cells; its seconds are written."""
     began_s = monotonic()
@@ -666,20 +621,6 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     shutil.copy(report, PICTURES / "large_report.pdf")
     reached("the report with coarse cells")
     assert not page.faults()
-
-
-def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -> None:
-    document = high_courtyard().model_dump(mode="json", exclude_none=True)
-    document["site"] |= {"width_m": 700.0, "height_m": 700.0, "air_height_m": 100.0}
-    save_scenario(Scenario.from_document(document, "wide"), tmp_path / "wide.toml")
-    page.open()
-    page.upload(tmp_path / "wide.toml")
-    page.until(lambda: "/design/" in page.driver.current_url)
-    page.button("Blast").click()
-    page.sees("GiB, must be at most 8: take larger cells", 120.0)
-    page.shoot("too_large")
-    page.driver.refresh()
-    page.sees("GiB, must be at most 8: take larger cells")
 
 
 def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:

@@ -791,24 +791,6 @@ def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> 
     }
 
 
-@given(st.lists(st.tuples(SHAPES, KINDS), max_size=10))
-def test_every_way_of_an_extract_is_on_the_ledger(
-    tmp_path_factory: pytest.TempPathFactory,
-    drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
-) -> None:
-    extract = town()
-    numbers = range(10, 10 + len(drawn))
-    for number, ((kind, x, y, side), tags) in zip(numbers, drawn, strict=True):
-        if kind == "LineString":
-            extract.way_of(number, [extract.node(x, y), extract.node(x + side, y)], **tags)
-        else:
-            extract.way(number, rectangle(x, y, side, side), **tags)
-    site = imported(extract.write(tmp_path_factory.mktemp("maps")), **HOUSE_1)
-    fates = Counter(entry.place for entry in site.ledger.of(*FATES))
-    tagged = [f"way {number}" for number, (_, tags) in zip(numbers, drawn, strict=True) if tags]
-    assert fates == Counter(["way 1", "way 2", *tagged])
-
-
 @given(
     st.lists(
         st.tuples(
