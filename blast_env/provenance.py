@@ -13,14 +13,17 @@ _NO_INFLUENCE: Final = frozenset(
     {
         "__init__.py",
         "__main__.py",
+        "answers",
+        "app",
         "atlas",
         "benchmark",
         "cli",
+        "design",
         "envs",
         "io",
         "plots",
-        "report",
         "sites",
+        "tools",
     }
 )
 """Parts of the package that cannot change the loads of a blast."""
