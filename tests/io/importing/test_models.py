@@ -8,8 +8,9 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, SiteImport, import_site
 from blast_env.io.importing.ledger import FATES, Fate
+from tests.io.importing.models import Model
 
-pytest.importorskip("ifcopenshell")
+ifcopenshell = pytest.importorskip("ifcopenshell")
 
 CASES = Path(__file__).parent / "cases"
 
@@ -107,9 +108,57 @@ def test_the_north_of_a_model_is_said() -> None:
 
 @pytest.mark.parametrize("name", sorted(path.stem[2:] for path in CASES.glob("i_*.ifc")))
 def test_every_element_of_a_model_has_one_fate(name: str) -> None:
-    import ifcopenshell
-
     model = ifcopenshell.open(str(CASES / f"i_{name}.ifc"))
     objects = [*model.by_type("IfcElement"), *model.by_type("IfcBuilding")]
     places = sorted(entry.place for entry in case(name).ledger.of(*FATES))
     assert places == sorted(f"{entry.is_a()} {entry.GlobalId}" for entry in objects)
+
+
+def plain_model() -> Model:
+    """Return a model in millimetres with nothing on its site."""
+    return Model("mm", 0.0, 0.0, "IFC4", ("plain",))
+
+
+def imported(model: Model, folder: Path) -> SiteImport:
+    options = ImportOptions(charge_at=(model.charge_at,), protect=("Town Hall",))
+    return import_site(model.write(folder), options)
+
+
+def test_storeys_and_windows_of_a_model_are_its_facade(tmp_path: Path) -> None:
+    """What is before the house, and in it, is left out by name."""
+    model = plain_model()
+    levels = model.building([0.0, 3.0], "Town Hall")
+    for level in levels:
+        model.slab(level, 0.0, (12.0, 8.0), 0.0)
+        model.walls(level, 0.0, (12.0, 8.0, 3.0))
+        for left in (1.0, 5.0, 9.0):
+            for y in (0.0, 7.7):
+                model.box("IfcWindow", level, (left, y, 0.9), (1.2, 0.3, 1.4), Fate.MERGED)
+    model.box("IfcColumn", levels[0], (2.0, -3.0, 0.0), (0.4, 0.4, 3.0), Fate.LEFT_OUT)
+    model.box("IfcFurniture", levels[0], (3.0, 3.0, 0.0), (0.5, 0.5, 0.9), Fate.LEFT_OUT)
+    site = imported(model, tmp_path)
+    assert {entry.place: entry.fate for entry in site.ledger.of(*FATES)} == model.fates
+    (hall,) = site.scenario.structures
+    assert (hall.title, hall.height_m) == ("Town Hall", 6.0)
+    assert site.buildings[0].outline.area == pytest.approx(96.0, rel=0.01)
+    assert hall.facade is not None
+    assert hall.facade.storeys == 2
+    assert hall.facade.bay_m == pytest.approx(40.0 * 2 / 12, abs=0.1)
+    assert pane_m(site) == (1.2, 1.4, 0.9)
+    (glass,) = site.ledger.of(Fate.GUESSED)
+    assert glass.kind == "glass, which IFC does not state"
+
+
+def test_a_model_without_a_unit_or_a_building_is_refused(tmp_path: Path) -> None:
+    model = plain_model()
+    with pytest.raises(BlastEnvError, match=r"model.ifc: has no IfcBuilding"):
+        imported(model, tmp_path)
+    model.building([0.0], "Town Hall")
+    with pytest.raises(BlastEnvError, match=r"model.ifc: has no building"):
+        imported(model, tmp_path)
+    model.file.by_type("IfcProject")[0].UnitsInContext = None
+    with pytest.raises(BlastEnvError, match=r"model.ifc: states no unit of length, must state one"):
+        imported(model, tmp_path)
+    (tmp_path / "bad.ifc").write_text("nonsense")
+    with pytest.raises(BlastEnvError, match=r"bad.ifc: cannot be read as IFC"):
+        import_site(tmp_path / "bad.ifc")
