@@ -20,9 +20,8 @@ from blast_env import cluster
 from blast_env.cli import app
 from blast_env.cluster import ClusterBackend, on_cluster
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, draw_threats
+from blast_env.evaluation import BlastEvaluator, BlastLoads, draw_threats
 from blast_env.evaluation.engines.contract import EngineBlast
-from blast_env.evaluation.record import BlastLoads
 from blast_env.runner import as_completed, run_all
 from blast_env.site import load_scenario
 from tests.pieces_of_work import Touch, name_and_seed, process, refuse_three, square, workers_within

@@ -9,8 +9,7 @@ import pytest
 
 import blast_env
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, evaluate_layout
-from blast_env.evaluation.cases import LoadCase
+from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.validation import NOT_KNOWN
 from blast_env.gas import GasRun

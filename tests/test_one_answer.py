@@ -16,8 +16,7 @@ from typing import Final
 import pytest
 from typer.testing import CliRunner
 
-from blast_env.answers import assess, compare
-from blast_env.answers.document import Document, Line, Number, Table
+from blast_env.answers import Document, Line, Number, Table, assess, compare
 from blast_env.answers.report import Report, StudyOptions, basis, report_document, summary
 from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions

@@ -3,7 +3,8 @@
 import pickle
 from types import SimpleNamespace
 
-from blast_env.answers.document import TYPOGRAPHIC, Table
+from blast_env.answers import Table
+from blast_env.answers.document import TYPOGRAPHIC
 from blast_env.app.jobs import Workers, do
 
 

@@ -8,8 +8,9 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 
+from blast_env.answers import Number
 from blast_env.answers.compare import verdict_table
-from blast_env.answers.document import AnyCell, Number
+from blast_env.answers.document import AnyCell
 from blast_env.app import edits, placing, session
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder

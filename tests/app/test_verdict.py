@@ -7,9 +7,8 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 
-from blast_env.answers import assess
+from blast_env.answers import Document, Line, Table, assess
 from blast_env.answers.assess import assessment, governing
-from blast_env.answers.document import Document, Line, Table
 from blast_env.app.jobs import Workers
 from blast_env.app.kept import write_kept
 from blast_env.app.placing import plain

@@ -22,16 +22,15 @@ from blast_agents.training.run_folder import RunConfiguration, RunFolder
 from blast_agents.training.weights import read_parameters
 from stable_baselines3.common.save_util import save_to_zip_file
 
-from blast_env.answers.document import Document, Line, Table
+from blast_env.answers import Document, Line, Table
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
 from blast_env.app.kept import read_kept, write_kept
 from blast_env.app.work import Answer, Question
 from blast_env.cluster import address_of
 from blast_env.errors import BlastEnvWarning
+from blast_env.evaluation import BlastKey, BlastLoads, BlastStore, StructureLoad
 from blast_env.evaluation.engines import simulate
-from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
-from blast_env.evaluation.store import BlastStore
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile, write_layout
 from blast_env.parquet import _run_record, checked_table, write_table

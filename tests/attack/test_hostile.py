@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env import Charge, load_scenario, simulate
-from blast_env.answers.document import Table
+from blast_env.answers import Table
 from blast_env.answers.terminal import print_parts
 from blast_env.benchmark import Run, Submission, make
 from blast_env.benchmark.methods import find_method

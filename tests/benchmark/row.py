@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from blast_env.evaluation.record import BlastLoads
+from blast_env.evaluation import BlastLoads
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, Scenario
 from tests.evaluation.engines.shade import ShadeEngine

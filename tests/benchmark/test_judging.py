@@ -14,6 +14,7 @@ from blast_env.benchmark import (
     BenchmarkProblem,
     ReferenceLayout,
     Run,
+    RunJudgement,
     ScoreReference,
     Submission,
     SubmissionJudgement,
@@ -25,7 +26,7 @@ from blast_env.benchmark import (
     standings_tables,
     stored_references,
 )
-from blast_env.benchmark.judging import RunJudgement, read_submission
+from blast_env.benchmark.judging import read_submission
 from blast_env.cli import app
 from blast_env.cli.judge import _Judging
 from blast_env.errors import BlastEnvError

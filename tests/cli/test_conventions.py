@@ -14,7 +14,7 @@ from typer.core import TyperGroup
 from typer.testing import CliRunner, Result
 
 from blast_env import save_scenario
-from blast_env.answers.document import Table
+from blast_env.answers import Table
 from blast_env.answers.terminal import TableView
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand

@@ -19,7 +19,7 @@ from blast_env.curves import (
     reflected_pa,
 )
 from blast_env.evaluation.questions.probability import load_factors
-from blast_env.site.blast_site import Charge
+from blast_env.site import Charge
 
 
 def turned(mach: float, wave: float) -> float:

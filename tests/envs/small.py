@@ -10,7 +10,8 @@ from gymnasium.utils.env_checker import data_equivalence
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ScenarioSource
-from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
+from blast_env.evaluation.engines import ParticleEngine
+from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.particles import Balls, BlastRun, CollisionType, Scene
 from blast_env.site import Scenario, load_scenario
 from tests import builders

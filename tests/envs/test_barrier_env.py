@@ -13,9 +13,7 @@ from blast_env.arrays import FloatArray
 from blast_env.envs.observable import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastStore, evaluate_layout
-from blast_env.evaluation.cases import LoadCase
-from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase, evaluate_layout
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario

@@ -10,7 +10,7 @@ import torch
 from stable_baselines3 import PPO
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.evaluation.record import BlastLoads, StructureLoad
+from blast_env.evaluation import BlastLoads, StructureLoad
 from blast_env.geometry import Element
 from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Scenario

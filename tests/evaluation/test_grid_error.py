@@ -6,13 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.answers.document import TYPOGRAPHIC, Number, percent, worse
+from blast_env.answers import Number
+from blast_env.answers.document import TYPOGRAPHIC, percent, worse
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Evaluators, compare, evaluate_layout
-from blast_env.evaluation.cases import LoadCaseSet, draw_threats
+from blast_env.evaluation import (
+    Evaluators,
+    LoadCaseSet,
+    compare,
+    convergence_index,
+    draw_threats,
+    evaluate_layout,
+)
 from blast_env.evaluation.engines import choosing_engine, final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.questions.grid_error import convergence_index
 from blast_env.site import load_scenario
 from blast_env.statistics import Estimate, reductions
 from tests.gas_sites import WALL, hut, site_document

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.answers.document import Number
+from blast_env.answers import Number
 from blast_env.answers.evaluate import means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from blast_env.answers.compare import comparison
-from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.blasts import Blasts
-from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.record import BlastRecord
 from blast_env.gas import stepped_buildings

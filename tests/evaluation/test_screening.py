@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blast_env.answers.document import Line
+from blast_env.answers import Line
 from blast_env.answers.screening import screening_answer
 from blast_env.atlas import packaged_laws
 from blast_env.curves import kingery_bulmash, oblique

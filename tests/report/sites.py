@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from blast_env.answers.document import Document, Table
+from blast_env.answers import Document, Table
 from blast_env.answers.html import page_of
 from blast_env.answers.report import Report, ReportDetails, report_document
 from blast_env.site import Scenario

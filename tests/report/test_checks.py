@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from blast_env.answers.document import Line
+from blast_env.answers import Line
 from blast_env.answers.report import Report, report_document
 from blast_env.curves import kingery_bulmash
 

@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 import blast_env
+from blast_env.answers import Number, Picture
 from blast_env.answers import report as reports
-from blast_env.answers.document import Number, Picture
 from blast_env.answers.report import (
     Limit,
     Report,
@@ -30,11 +30,17 @@ from blast_env.answers.report.basis import glazing_cost
 from blast_env.app.work import Answer, Question
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, LoadCaseSet, StructureLoad
+from blast_env.evaluation import (
+    BlastEvaluator,
+    BlastLoads,
+    LoadCase,
+    LoadCaseSet,
+    StructureLoad,
+    convergence_index,
+)
 from blast_env.evaluation.blasts import NO_BARRIER, Blasts
 from blast_env.evaluation.engines.gas import BlastMeasurement, GasBlast, GasEngine, GasResult
 from blast_env.evaluation.places import other_places
-from blast_env.evaluation.questions.grid_error import convergence_index
 from blast_env.evaluation.questions.verdict import consequences_of
 from blast_env.evaluation.record import BlastRecord
 from blast_env.evaluation.study import run_study

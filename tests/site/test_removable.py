@@ -11,8 +11,7 @@ import blast_env
 from blast_env.design.search import DesignProblem, RandomSearch
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import LayoutError
-from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece, Removal, layout_words, standing
 from blast_env.io.export import LayoutPlan, bill_of_quantities

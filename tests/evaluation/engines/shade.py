@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from blast_env.evaluation import BlastLoads, StructureLoad
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.record import BlastLoads, StructureLoad
 from blast_env.geometry import Element
 from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Scenario

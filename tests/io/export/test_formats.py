@@ -22,7 +22,7 @@ from blast_env.io.export import (
     history_table,
 )
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout.build_site import draw_threat
+from blast_env.layout import draw_threat
 from blast_env.site import Charge, Scenario
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES

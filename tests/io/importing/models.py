@@ -10,7 +10,7 @@ import pytest
 import shapely
 from shapely.affinity import rotate, scale
 
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing import Fate
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 

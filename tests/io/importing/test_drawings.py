@@ -9,8 +9,7 @@ from ezdxf.entities.insert import Insert
 from ezdxf.filemanagement import new, readfile
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
-from blast_env.io.importing.ledger import FATES, Fate
+from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.maps import rectangle
 
 CASES = Path(__file__).parent / "cases"

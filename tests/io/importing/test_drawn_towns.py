@@ -17,8 +17,7 @@ from ezdxf.render.forms import cube
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
-from blast_env.io.importing.ledger import FATES, Fate
+from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.maps import rectangle
 
 LOT_M = 60.0

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
-from blast_env.io.importing.ledger import FATES, Fate
+from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.models import Model
 
 ifcopenshell = pytest.importorskip("ifcopenshell")

@@ -13,8 +13,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
-from blast_env.io.importing.ledger import FATES, Fate
+from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.models import LOT_M, TURNS_DEG, UNITS, WALL_M, WAYS, Model
 
 TURNS = st.sampled_from(TURNS_DEG)

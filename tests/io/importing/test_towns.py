@@ -9,8 +9,7 @@ from collections.abc import Mapping
 import pytest
 from hypothesis import given
 
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
-from blast_env.io.importing.ledger import FATES, Fate
+from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.maps import DEGREE_M
 from tests.io.importing.towns import (
     Item,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing import Fate
 from tests.io.importing.maps import Extract
 
 LOT_M: Final = 40.0
