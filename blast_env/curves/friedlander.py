@@ -70,6 +70,7 @@ class Friedlander:
             ("impulse", impulse),
         ):
             checked_array(name, value, above=0.0, dimensions=0)
+        # Equation 2 gives the decay; from half of the rectangle on only the triangle has so much.
         share = impulse / peak / positive_duration_s
         if share >= 0.5:
             return cls(peak, 2.0 * impulse / peak, 0.0, arrival_s)
@@ -149,6 +150,7 @@ def impulse_share_until(x: FloatArray, decay: float | FloatArray) -> FloatArray:
 def _impulse_share(decay: float | FloatArray) -> FloatArray:
     """Return (b - 1 + exp(-b)) / b^2, the integral of (1 - x) exp(-b x) from 0 to 1."""
     b = np.asarray(decay, dtype=np.float64)
+    # The closed form cancels for small b, where the series takes its place.
     large = np.maximum(b, _SERIES_BELOW)
     closed = (large + np.expm1(-large)) / large / large
     series = np.polynomial.polynomial.polyval(np.minimum(b, _SERIES_BELOW), _SERIES)

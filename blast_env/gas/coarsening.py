@@ -113,11 +113,14 @@ class CoarseningSolver:
         grid = with_double_cells(fine)
         faces = exposed_faces(grid, grid.solid)
         self.current = self.current.on_double_cells(grid, faces)
+        # 1. Smallest cells in the new ones: two by two, behind the layer that the skirt gave.
         self._cells = [
             cells // 2 + (low > 0)
             for cells, (low, _) in zip(self._cells, fine.buffer_layers_by_axis, strict=True)
         ]
+        # 2. Recorders keep their faces: each reads the nearest new one with its normal.
         self._of_face = nearest_faces(self.faces, self.grid, faces, grid)
+        # 3. Air that has become solid reads the nearest air.
         nearest = distance_transform_edt(grid.solid, return_distances=False, return_indices=True)
         self._nearest_air = np.asarray(nearest, dtype=np.int64)
 
@@ -132,6 +135,7 @@ def shape_to_double(
         buffer_layers: Layers of the skirt; each doubling takes one.
         times: Number of doublings.
     """
+    # A layer at each open end comes from the skirt, so the shape is extended to what then divides.
     ends = (2, 2, 1) if buffer_layers else (0, 0, 0)
     nx, ny, nz = (n + (2 * taken - n) % 2**times for n, taken in zip(shape, ends, strict=True))
     return nx, ny, nz
@@ -165,6 +169,7 @@ def nearest_faces(
     centres_m, other_centres_m = faces.centres_m(grid), others.centres_m(other_grid)
     for axis in range(3):
         for side in (-1, 1):
+            # One tree for each normal, so that no face finds one on the other side of a thin wall.
             own = np.flatnonzero((faces.axis == axis) & (faces.side == side))
             there = np.flatnonzero((others.axis == axis) & (others.side == side))
             if len(own):

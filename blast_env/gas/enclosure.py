@@ -59,11 +59,14 @@ def room_around(grid: GasGrid, place_m: tuple[float, float, float]) -> Room | No
         return None
     from scipy.ndimage import label  # takes a while to import
 
+    # 1. Covered cells, from the top down.
     above = np.logical_or.accumulate(grid.solid[:, :, ::-1], axis=2)[:, :, ::-1]
+    # 2. Those that hang together with the place.
     labels, _ = label(above & ~grid.solid)
     space = labels == labels[index]
     if not space[index]:
         return None
+    # 3. The sides of the space, neighbour by neighbour.
     walls = sides = 0
     for axis in (0, 1):
         for step in (1, -1):

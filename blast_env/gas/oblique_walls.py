@@ -88,6 +88,8 @@ class ObliqueLoads:
 
     def along_normals(self, values: FloatArray) -> FloatArray:
         """Return values of faces, on oblique walls replaced by the means of bays (faces,)."""
+        # The cosine turns the area of a step into that of the wall, which is the weight of the
+        # mean.
         bay, share = self.bay[self.members], self.share[self.members]
         area = np.bincount(bay, weights=share)
         means = np.bincount(bay, weights=share * values[self.members]) / area
@@ -121,6 +123,7 @@ def _bays(
         wall: The wall.
         structure: Its structure.
     """
+    # Bays along the wall of about the facade's width, and storeys above its base.
     facade = structure.facade
     bay_m = BAY_M if facade is None else facade.bay_m
     columns = max(1, round(wall.length_m / bay_m))

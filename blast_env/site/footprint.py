@@ -58,6 +58,8 @@ class Footprint:
         columns, rows = int(np.ceil(right)) - first[0], int(np.ceil(top)) - first[1]
         x_m = MODULE_SIDE_M * (first[0] + np.arange(columns) + 0.5) + _OFF_CENTRE_M[0]
         y_m = MODULE_SIDE_M * (first[1] + np.arange(rows) + 0.5) + _OFF_CENTRE_M[1]
+        # A module belongs to the polygon if its centre does; centres are a little off the grid, so
+        # that none lies on an outline along it.
         shapely.prepare(self.polygon)
         filled = shapely.contains_xy(self.polygon, x_m[np.newaxis], y_m[:, np.newaxis])
         used = [np.flatnonzero(filled.any(axis=axis)) for axis in (1, 0)]
@@ -118,6 +120,8 @@ class Footprint:
             centres_m: Centres of the faces in plan (n, 2).
             outwards: Their normals in plan (n, 2).
         """
+        # 1. Equal places of a column of faces once: walls are upright, so that heights do not
+        # matter.
         faces = np.asarray(np.round(np.hstack((centres_m, outwards)), 9), dtype=np.float64)
         places, owner = np.unique(faces, axis=0, return_inverse=True)
         number = np.zeros(len(places), dtype=np.int64)
@@ -125,6 +129,8 @@ class Footprint:
         step = max(_PAIRS // len(self.walls), 1)
         for first in range(0, len(places), step):
             some: FloatArray = places[first : first + step]
+            # 2. The nearest of the walls that look the same way; of two equally near ones the more
+            # parallel.
             cosines = some[:, 2:] @ normals
             away_m = np.stack([wall.distances_m(some[:, :2]) for wall in self.walls], axis=1)
             away_m = np.where(cosines > _LEAST_COSINE, away_m - _TIE_M * cosines, np.inf)
@@ -204,6 +210,8 @@ def _straightened(ring: Ring, most_m: float) -> Ring:
     The corners farthest from the middle and from each other stay.
     """
     places = np.array(ring)
+    # Douglas and Peucker's simplification keeps the ends of a line: a ring is cut into two lines
+    # at corners that are surely corners.
     first = int(np.hypot(*(places - places.mean(axis=0)).T).argmax())
     places = np.roll(places, -first, axis=0)
     middle = int(np.hypot(*(places - places[0]).T).argmax())

@@ -36,6 +36,8 @@ def _cut(
 ) -> BoolArray:
     """Return whether lines from a place to points pass through the inside of a box (n,)."""
     way_m = points_m - start_m
+    # Slab method: a line is in the box between its last entry into and its first exit from the
+    # spaces between two opposite sides. A line along a side is in that space or never.
     with np.errstate(divide="ignore", invalid="ignore"):
         at = np.stack(((low_m - start_m) / way_m, (high_m - start_m) / way_m))
     enter, leave = at.min(axis=0), at.max(axis=0)
