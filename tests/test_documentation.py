@@ -171,7 +171,7 @@ def test_the_documentation_names_every_command_of_the_studies() -> None:
         assert found <= documented
 
 
-def test_pages_that_code_and_texts_name_exist() -> None:
+def test_files_that_code_and_texts_name_exist() -> None:
     texts = dict(TEXTS)
     for folder in ("blast_env", "agents", "studies", "tests"):
         for suffix in ("*.py", "*.j2"):
@@ -180,7 +180,11 @@ def test_pages_that_code_and_texts_name_exist() -> None:
     named = {
         (where, page)
         for where, text in texts.items()
-        for page in re.findall(r"(?<!/)docs/[\w/.-]+\.(?:md|png|gif|mp4|csv|toml)", text)
+        for page in re.findall(
+            r"(?<![\w/])(?:docs/[\w/.-]+\.(?:md|png|gif|mp4|csv|toml)"
+            r"|(?:tests|studies|blast_env|agents|examples)/[\w/.-]+\.py)\b",
+            text,
+        )
     }
     assert len(named) > 20
     assert {(where, page) for where, page in named if not (ROOT / page).exists()} == set()
