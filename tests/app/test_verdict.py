@@ -1,4 +1,4 @@
-"""Questions on the page: the answers of `assess`, `assess --capacity` and `advise`."""
+"""Questions on the page: screening, and the answers of `assess`, its capacity and `advise`."""
 
 from functools import partial
 from pathlib import Path
@@ -111,5 +111,17 @@ def test_the_answer_is_on_the_page_until_the_layout_changes(tmp_path: Path) -> N
         await user.should_not_see("have changed since")
         session.put("wall", session.design.with_layout(WALL))
         await user.should_see("have changed since")
+
+    play(tmp_path, story)
+
+
+def test_the_answer_stands_on_the_page_at_once(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, glazed_hut())
+        user.find("Screening").click()
+        await user.should_see("worst place by damage", retries=100)
+        await user.should_see(kind=ui.table)
+        session.put_site("no facade", hut())
+        await user.should_see("Give structures windows or wall panels first", retries=50)
 
     play(tmp_path, story)

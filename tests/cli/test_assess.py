@@ -1,4 +1,4 @@
-"""`blast-env assess`: the verdict, what better glass brings, and what is refused."""
+"""`blast-env assess`: the verdict, what better glass brings, screening, and capacity."""
 
 from pathlib import Path
 
@@ -9,8 +9,14 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.cli.options import wanted_level
+from blast_env.evaluation import LoadCaseSet
+from blast_env.evaluation.blasts import Blasts
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.questions import capacity
+from blast_env.evaluation.questions.probability import scaled_to
+from blast_env.evaluation.questions.verdict import Consequences, consequences_of
 from blast_env.response import LevelOfProtection
-from blast_env.site import Scenario
+from blast_env.site import Charge, Scenario
 from tests.gas_sites import WALL, glazed_hut
 
 
@@ -99,3 +105,53 @@ def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
     panes = [line for line in output.splitlines() if line.startswith(("no barrier", "6 barrier"))]
     assert all(" +- " in pane for pane in panes)
     assert len(panes) == 2
+
+
+# --- Screening: tables, the verdict by the requirement, and the picture.
+
+
+def test_threats_stand_offs_and_rings(tmp_path: Path) -> None:
+    site, picture = tmp_path / "glazed.toml", tmp_path / "rings.png"
+    blast_env.save_scenario(glazed_hut(), site)
+    masses = ("--mass", "vest", "--mass", "bag=2,c4")
+    output = run("--screen", site, *masses, "--require", "iso D", "--picture", picture)
+    assert "required: ISO 16933 rating D" in output
+    assert output.count("glass: small_window *") == 2
+    assert "left out: surroundings outside the range of the atlas" in output
+    assert "left out: shielding" in run("--screen", site, *masses, "--no-shielding")
+    assert picture.stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_gas_stands_beside_the_curves(tmp_path: Path) -> None:
+    site = tmp_path / "glazed.toml"
+    blast_env.save_scenario(glazed_hut(), site)
+    assert run("--screen", site, "--mass", "bag=2", "--gas", "--cell", "0.5").count("by gas") == 1
+
+
+# --- Capacity.
+
+
+def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the hut; all blasts but the first are scaled from it."""
+    site = tmp_path / "glazed.toml"
+    blast_env.save_scenario(glazed_hut(), site)
+    layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
+    first: list[Blasts] = []
+    own = Campaign.run
+
+    def once(campaign: Campaign) -> LoadCaseSet:
+        first[:] = first or [own(campaign)]
+        return campaign.case
+
+    def scaled(case: LoadCaseSet) -> Consequences:
+        (charge,) = case.charges
+        assert isinstance(charge, Charge)
+        return scaled_to(consequences_of(first[0]), charge)
+
+    monkeypatch.setattr(Campaign, "run", once)
+    monkeypatch.setattr(capacity, "consequences_of", scaled)
+    output = run("--capacity", site, "--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
+    rows = [line.split() for line in output.splitlines() if "2.0, 4.0" in line]
+    assert len(rows) == 4
+    assert "largest charge (kg TNT) that keeps each level of protection" in output

@@ -1,4 +1,4 @@
-"""All commands: numbers that are refused, alone and with commas; notes."""
+"""All commands: numbers that are refused, alone and with commas; notes; progress in log files."""
 
 import warnings
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from blast_env.cli import app
+from blast_env.cli import app, output
 from blast_env.cli.command import ShellCommand
 from blast_env.cli.options import numbers
 from blast_env.errors import BlastEnvError
@@ -55,3 +55,20 @@ def test_a_note_of_a_store_is_one_plain_line(tmp_path: Path) -> None:
     assert result.stderr.startswith(f"note: {path}: has lost its content")
     assert result.stderr.count("\n") == 1
     assert warnings.showwarning is before
+
+
+def test_a_log_file_gets_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    passed_s = 0.0
+    monkeypatch.setattr(output, "perf_counter", lambda: passed_s)
+    with output.progress_bar("training runs/a") as progress:
+        for step in range(1, 101):
+            passed_s += 1.0
+            progress(step / 100)
+            if step == 30:
+                printed = capsys.readouterr().err
+    assert printed == "training runs/a: 30% after 30 s\n"
+    assert capsys.readouterr().err == (
+        "training runs/a: 60% after 60 s\ntraining runs/a: 90% after 90 s\n"
+    )
