@@ -65,6 +65,49 @@ class _Faces:
         )
 
 
+def _reflected(
+    faces: _Faces, charge: FloatArray, bays: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the ways from bays to the images of the charge behind walls, and how much they meet.
+
+    Args:
+        faces: The walls.
+        charge: Place of the charge, m/kg^(1/3) (3,).
+        bays: Middles of the bays (bays, 3).
+
+    Returns:
+        The ways (bays, faces, 3), their lengths (bays, faces), and the share of the bell that meets
+        the wall, 0 where charge or bay is behind it (bays, faces).
+    """
+    from scipy.special import ndtr  # takes a while to import
+
+    # (1) Walls that face the charge, and bays before them.
+    before_charge = faces.outward * (charge[faces.axis] - faces.at)
+    before_bay = faces.outward * (bays[:, faces.axis] - faces.at)
+    valid = (before_charge > _CLEAR) & (before_bay > _CLEAR)
+    # (2) The image, where its way crosses the wall, and the share of the bell on the wall.
+    image = np.broadcast_to(charge, (len(bays), len(faces.at), 3)).copy()
+    index = np.arange(len(faces.at))
+    image[:, index, faces.axis] = 2.0 * faces.at - charge[faces.axis]
+    ways = image - bays[:, np.newaxis]
+    longer = np.linalg.norm(ways, axis=2)
+    total = np.maximum(before_charge + before_bay, _LEAST)
+    share = np.clip(before_charge / total, 0.0, 1.0)
+    crossing = image - ways * share[..., np.newaxis]
+    d1, d2 = share * longer, (1.0 - share) * longer
+    bell = np.maximum(np.sqrt(WIDTH * d1 * d2 / np.maximum(longer, _LEAST)), _LEAST)
+    slant = np.maximum(total / np.maximum(longer, _LEAST), 0.1)
+    across = crossing[:, index, 1 - faces.axis]
+    wide = ndtr((faces.high - across) * slant / bell) - ndtr((faces.low - across) * slant / bell)
+    up = crossing[..., 2]
+
+    def below(height: FloatArray) -> FloatArray:
+        return np.asarray(ndtr((height - up) / bell) + ndtr((height + up) / bell) - 1.0)
+
+    met = np.where(valid, wide * np.maximum(below(faces.top) - below(faces.base), 0.0), 0.0)
+    return ways, longer, met
+
+
 def numbers_of_echoes(
     charge: FloatArray,
     bays: FloatArray,
@@ -81,8 +124,6 @@ def numbers_of_echoes(
         boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
         high: Height of the building of each bay (bays,).
     """
-    from scipy.special import ndtr  # takes a while to import
-
     way = charge - bays
     distance = np.maximum(np.linalg.norm(way, axis=1), _LEAST)
     cosine = way @ normal / distance
@@ -90,33 +131,8 @@ def numbers_of_echoes(
     near = np.zeros((len(bays), 3))
     if len(boxes):
         faces = _Faces.of(boxes)
-        # (1) Walls that face the charge, and bays before them.
-        before_charge = faces.outward * (charge[faces.axis] - faces.at)
-        before_bay = faces.outward * (bays[:, faces.axis] - faces.at)
-        valid = (before_charge > _CLEAR) & (before_bay > _CLEAR)
-        # (2) The image, where its way crosses the wall, and the share of the bell on the wall.
-        image = np.broadcast_to(charge, (len(bays), len(faces.at), 3)).copy()
-        index = np.arange(len(faces.at))
-        image[:, index, faces.axis] = 2.0 * faces.at - charge[faces.axis]
-        ways = image - bays[:, np.newaxis]
-        longer = np.linalg.norm(ways, axis=2)
-        total = np.maximum(before_charge + before_bay, _LEAST)
-        share = np.clip(before_charge / total, 0.0, 1.0)
-        crossing = image - ways * share[..., np.newaxis]
-        d1, d2 = share * longer, (1.0 - share) * longer
-        bell = np.maximum(np.sqrt(WIDTH * d1 * d2 / np.maximum(longer, _LEAST)), _LEAST)
-        slant = np.maximum(total / np.maximum(longer, _LEAST), 0.1)
-        across = crossing[:, index, 1 - faces.axis]
-        wide = ndtr((faces.high - across) * slant / bell) - ndtr(
-            (faces.low - across) * slant / bell
-        )
-        up = crossing[..., 2]
-
-        def below(height: FloatArray) -> FloatArray:
-            return np.asarray(ndtr((height - up) / bell) + ndtr((height + up) / bell) - 1.0)
-
-        met = np.where(valid, wide * np.maximum(below(faces.top) - below(faces.base), 0.0), 0.0)
-        # (3) Its weight by distance and incidence, relative to the charge itself.
+        ways, longer, met = _reflected(faces, charge, bays)
+        # (3) The weight of an echo by distance and incidence, relative to the charge itself.
         own = np.maximum(ways @ normal / np.maximum(longer, _LEAST), 0.0)
         incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
             _SLANT + (1.0 - _SLANT) * np.maximum(cosine, 0.0)[:, np.newaxis] ** 2
@@ -126,7 +142,7 @@ def numbers_of_echoes(
         closeness = met * np.log1p(distance[:, np.newaxis] / later)
         # (4) Opposite, left and right of the bay's wall.
         outward = np.zeros((len(faces.at), 2))
-        outward[index, faces.axis] = faces.outward
+        outward[np.arange(len(faces.at)), faces.axis] = faces.outward
         facing = outward @ normal[:2]
         turned = outward @ np.array([-normal[1], normal[0]])
         for k, chosen in enumerate((facing < -0.5, turned > 0.5, turned < -0.5)):
