@@ -32,7 +32,7 @@ class Tool:
         description: What it does, for a model.
         arguments: Record of its arguments.
         result: Record of its result.
-        function: Method of a session.
+        function: Method of its owner, a session.
     """
 
     name: str
@@ -115,20 +115,28 @@ TOOLS: Final[Mapping[str, Tool]] = MappingProxyType({tool.name: tool for tool in
 """The tools by name."""
 
 
-def call_tool(session: Session, name: str, arguments: Mapping[str, Any]) -> Answer:
+def call_tool(
+    owner: Any, name: str, arguments: Mapping[str, Any], tools: Mapping[str, Tool] = TOOLS
+) -> Answer:
     """Call a tool with plain JSON values.
+
+    Args:
+        owner: The session, or else the owner of the tools.
+        name: The tool's name.
+        arguments: Its arguments by name.
+        tools: The tools.
 
     Raises:
         UnknownNameError: If there is no such tool.
         BlastEnvError: If the arguments have another form, or the tool refuses.
     """
-    if name not in TOOLS:
-        raise UnknownNameError("tool", name, TOOLS)
-    tool = TOOLS[name]
+    if name not in tools:
+        raise UnknownNameError("tool", name, tools)
+    tool = tools[name]
     try:
         given = checked_as(tool.arguments, dict(arguments))
     except BlastEnvError as error:
         known = ", ".join(tool.arguments.model_fields) or "none"
         message = f"{name} was not called: {error}; its arguments: {known}"
         raise BlastEnvError(message) from error
-    return tool.function(session, **{key: getattr(given, key) for key in type(given).model_fields})
+    return tool.function(owner, **{key: getattr(given, key) for key in type(given).model_fields})

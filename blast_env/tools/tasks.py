@@ -85,11 +85,6 @@ class Tasks:
             return Definition(f"site_{HELD_OUT_SITES + number}", "known")
         return replace(secret_sites(self.secret, _SECRET)[number], family="known")
 
-    def spec(self, split: str, index: int) -> dict[str, Any]:
-        """Return a problem's split and index, which do not tell its site; errors as `problem`."""
-        self.problem(split, index)
-        return {"id": f"{split}-{index}", "split": split, "index": index}
-
     def begin(self, episode: Episode) -> Session:
         """Return a new session; errors as `problem` and `Session`."""
         index = episode.index

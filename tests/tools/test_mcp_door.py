@@ -1,11 +1,7 @@
 """The door by MCP, with the package's own client: in memory, by standard input, and by HTTP."""
 
 import json
-import os
-import socket
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +20,7 @@ from blast_env.tools import TOOLS, Episode, Sessions
 from blast_env.tools.mcp_door import mcp_server
 from blast_env.tools.scripts import played_in, rules_guesses_blasts
 from tests.tools.row_session import BEST, session, walls
+from tests.tools.serving import ENVIRONMENT, served
 
 
 def sessions() -> Sessions:
@@ -63,7 +60,7 @@ def test_a_script_gets_the_score_that_python_gets() -> None:
     async def work() -> float:
         async with mcp.Client(mcp_server(sessions())) as client:
             listed = {tool.name: tool for tool in (await client.list_tools()).tools}
-            assert set(listed) == {"begin", *TOOLS}
+            assert [*listed] == ["begin", *TOOLS]
             assert listed["look"].output_schema == TOOLS["look"].result_schema
             return await play(client)
 
@@ -100,14 +97,13 @@ def test_full_zero_malformed_and_reseeded() -> None:
     within(work)
 
 
-COMMAND = [sys.executable, "-m", "blast_env", "serve", "--mcp", "--budget", "0"]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-
-
 def test_standard_input_and_output() -> None:
     async def work() -> str:
         server = StdioServerParameters(
-            command=COMMAND[0], args=COMMAND[1:], env=ENVIRONMENT, cwd=str(Path.cwd())
+            command=sys.executable,
+            args=["-m", "blast_env", "serve", "--mcp", "--budget", "0"],
+            env=ENVIRONMENT,
+            cwd=str(Path.cwd()),
         )
         async with mcp.Client(server) as client:
             found = await values(client, "look")
@@ -118,28 +114,14 @@ def test_standard_input_and_output() -> None:
 
 
 def test_http_needs_the_token() -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    command = [*COMMAND, "--http", "--port", str(port)]
-    with subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True) as server:
-        assert server.stderr is not None
-        try:
-            token = server.stderr.readline().split()[-1].rstrip(")")
-            within(lambda: by_http(f"http://127.0.0.1:{port}/mcp", token))
-        finally:
-            server.terminate()
-            server.stderr.close()
+    with served("--mcp", "--http", "--budget", "0") as (port, line):
+        token = line.split()[-1].rstrip(")")
+        within(lambda: by_http(f"http://127.0.0.1:{port}/mcp", token))
 
 
 async def by_http(url: str, token: str) -> None:
     async with httpx2.AsyncClient(timeout=30.0) as bare:
-        for _ in range(100):
-            try:
-                refused = await bare.post(url, json={})
-                break
-            except httpx2.ConnectError:
-                time.sleep(0.1)
+        refused = await bare.post(url, json={})
         assert refused.status_code == 403
         assert "with its token" in refused.text
     headers = {"Authorization": f"Bearer {token}"}

@@ -1,10 +1,5 @@
 """The door by OpenEnv: the environment itself, and a server with the package's own client."""
 
-import os
-import socket
-import subprocess
-import sys
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -20,6 +15,7 @@ from blast_env.tools import TOOLS, Tasks  # noqa: E402
 from blast_env.tools.openenv_door import ToolCall, ToolEnvironment  # noqa: E402
 from blast_env.tools.scripts import played, played_in, rules_guesses_blasts  # noqa: E402
 from tests.tools.row_session import BEST, session, walls  # noqa: E402
+from tests.tools.serving import served  # noqa: E402
 
 SECRET = "correct horse"
 
@@ -80,44 +76,18 @@ def test_a_step_before_a_reset_ends_at_once(environment: ToolEnvironment) -> Non
         assert "split" in wrong.error
 
 
-def test_tasks_do_not_tell_test_sites(environment: ToolEnvironment) -> None:
-    assert environment.list_splits() == ["train", "test", "benchmark"]
-    assert environment.get_task("test", 3) == {"id": "test-3", "split": "test", "index": 3}
-    assert len(environment.get_task_range("test", 2, 5)) == 3
-    with pytest.raises(IndexError, match="no problem 99"):
-        environment.get_task("benchmark", 99)
-    assert ToolEnvironment(Tasks()).list_splits() == ["train", "benchmark"]
-
-
 def test_a_server_needs_its_address_and_keeps_clients_apart() -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "blast_env", "serve", "--openenv", "--port", str(port)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as server:
-        assert server.stderr is not None
-        try:
-            address = next(word for line in server.stderr for word in line.split() if "://" in word)
-            with pytest.raises(urllib.error.HTTPError, match="403"):
-                answered(f"http://127.0.0.1:{port}/schema")
-            assert b"ToolCall" in answered(f"{address}/schema")
-            by_clients(address)
-        finally:
-            server.terminate()
-            server.stderr.close()
+    with served("--openenv") as (port, line):
+        address = line.split()[-1]
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            answered(f"http://127.0.0.1:{port}/schema")
+        assert b"ToolCall" in answered(f"{address}/schema")
+        by_clients(address)
 
 
 def answered(url: str) -> bytes:
-    for _ in range(100):
-        try:
-            with urllib.request.urlopen(url, timeout=10.0) as answer:
-                return bytes(answer.read())
-        except urllib.error.HTTPError:
-            raise
-        except urllib.error.URLError:
-            time.sleep(0.1)
-    raise AssertionError("no answer")
+    with urllib.request.urlopen(url, timeout=10.0) as answer:
+        return bytes(answer.read())
 
 
 def by_clients(address: str) -> None:

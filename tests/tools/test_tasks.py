@@ -4,7 +4,8 @@ import pytest
 
 from blast_env.benchmark import DEFINITIONS
 from blast_env.errors import BlastEnvError
-from blast_env.tools import Tasks
+from blast_env.tools import Episodes, TaskLists, Tasks
+from tests.tools.row_session import BEST, session, walls
 
 SECRET = "correct horse"
 
@@ -35,4 +36,39 @@ def test_splits_have_ends() -> None:
             tasks.problem(split, index)
     with pytest.raises(BlastEnvError, match="8"):
         Tasks("short")
-    assert tasks.spec("train", 2) == {"id": "train-2", "split": "train", "index": 2}
+
+
+def test_lists_tell_no_site() -> None:
+    lists = TaskLists(Tasks(SECRET))
+    assert lists.list_splits() == ["train", "test", "benchmark"]
+    assert TaskLists(Tasks()).list_splits() == ["train", "benchmark"]
+    assert lists.get_task("test", 3) == {"id": "test-3", "split": "test", "index": 3}
+    assert lists.get_task_range("test", 2, 4) == [
+        lists.get_task("test", 2),
+        lists.get_task("test", 3),
+    ]
+    assert len(lists.list_tasks("benchmark")) == lists.num_tasks("benchmark") == len(DEFINITIONS)
+    for index in (-1, len(DEFINITIONS)):
+        with pytest.raises(IndexError, match=f"no problem {index}"):
+            lists.get_task("benchmark", index)
+
+
+def test_rewards_of_an_episode_sum_to_its_score() -> None:
+    """A step before a reset, an illegal one and one after the end have none."""
+    episodes = Episodes(Tasks(session=lambda _, seed, budget: session(seed, budget)))
+    early = episodes.step("look", {})
+    assert (early.done, early.error) == (True, "no episode has begun: call reset")
+    first = episodes.reset({"budget": 2})
+    assert first.result is not None
+    assert first.result["blasts_left"] == 2
+    turns = [
+        episodes.step("submit", {"layout": "all"}),
+        episodes.step("blast", {"layout": walls(BEST[0])}),
+        episodes.step("submit", {"layout": walls(*BEST)}),
+        episodes.step("submit", {"layout": walls(*BEST)}),
+    ]
+    assert [turn.reward for turn in turns] == [0.0, 0.0, 1.0, 0.0]
+    assert [turn.done for turn in turns] == [False, False, True, True]
+    assert [bool(turn.error) for turn in turns] == [True, False, False, True]
+    assert episodes.steps == 4
+    episodes.close()
