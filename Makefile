@@ -74,6 +74,21 @@ $(DOORS:%=matrix-%): matrix-%: $(VENV)/.uv
 	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) $(MATRIX_TOOLS)
 	$(MATRIX_PYTHON) -m pytest --numprocesses auto -rs tests/tools
 
+# verifiers requires another mcp than the door by OpenEnv, which it plays from an environment of its
+# own; uv is what it prepares its harness with.
+matrix: matrix-verifiers
+matrix-verifiers: export BLAST_ENV_VF_EVAL = $(abspath out/matrix/verifiers-client/bin/vf-eval)
+matrix-verifiers: export PATH := $(abspath $(BIN)):$(PATH)
+matrix-verifiers: $(VENV)/.uv
+	mkdir -p out/matrix
+	$(BIN)/uv venv --quiet --clear --python $(PYTHON) out/matrix/verifiers-client
+	$(BIN)/uv pip install --quiet --python out/matrix/verifiers-client/bin/python \
+		"verifiers[openenv]==0.4.0"
+	$(BIN)/uv venv --quiet --clear --python $(PYTHON) out/matrix/verifiers
+	$(BIN)/uv pip install --quiet --python out/matrix/verifiers/bin/python -e ".[openenv,render]"
+	$(BIN)/uv pip install --quiet --python out/matrix/verifiers/bin/python $(MATRIX_TOOLS)
+	out/matrix/verifiers/bin/python -m pytest -rs tests/tools/test_verifiers.py
+
 matrix-%: $(VENV)/.uv
 	mkdir -p out/matrix
 	grep '^torch==' constraints.txt > out/matrix/torch.txt
