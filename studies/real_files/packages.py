@@ -15,6 +15,9 @@ from blast_env.files import scratch_folder
 from studies.real_files.survey import SUFFIXES
 
 _LIST: Final = Path(__file__).parent / "packages.toml"
+_BESIDE: Final = (".shx", ".dbf", ".prj", ".cpg")
+"""Suffixes of the files beside a shapefile, without which it cannot be read."""
+
 _MOST_BYTES: Final = 60_000_000
 _SECONDS: Final = 300
 
@@ -99,4 +102,4 @@ def _members(archive: Path) -> Iterator[tuple[str, bytes]]:
 def _is_map(name: str) -> bool:
     """Return whether a file is a map, drawing or model by its name; JSON may be anything."""
     lower = PurePosixPath(name).name.lower()
-    return lower.endswith(SUFFIXES) and not lower.endswith(".json")
+    return lower.endswith((*SUFFIXES, *_BESIDE)) and not lower.endswith(".json")

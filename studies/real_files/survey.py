@@ -18,6 +18,7 @@ from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
 SUFFIXES: Final = (
     *(".geojson", ".json", ".city.jsonl", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf", ".ifc"),
+    *(".gpkg", ".shp", ".fgb", ".kml", ".parquet"),
 )
 
 _LIMITS: Final = ReadingLimits(processor_s=60, memory_bytes=1_000_000_000, wall_s=300.0)

@@ -29,9 +29,12 @@ _TAG_NAMES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Tags by other names: a shapefile cuts names after ten letters, KML has a capital."""
 
+_LAYER: Final = "Layer"
+"""Tag with the name of the layer in a file of several; OpenStreetMap's `layer` is a height."""
+
 
 def read_layers(site_map: SiteMap) -> None:
-    """Read all layers of a file into a map.
+    """Read all layers of a file into a map; of several, each object has its own as `Layer`.
 
     Its coordinates are in the reference system of the options, `local` for metres without a place
     on the Earth; that of the layers unless given.
@@ -72,6 +75,8 @@ def _features(
             for name, value in zip(fields, values, strict=True)
             if (plain := _plain(value)) is not None
         }
+        if layer:
+            properties.setdefault(_LAYER, layer)
         tags = tags_of({"properties": properties})
         if given is None or (geometry := shapely.from_wkb(given)).is_empty:
             yield MapFeature(shapely.Point(), tags, place, "features without a geometry")

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,18 @@ def test_a_geopackage_of_two_layers_is_the_map(tmp_path: Path) -> None:
     assert found.scenario.content_hash == import_site(MARKET, OPTIONS).scenario.content_hash
     places = {building.place for building in found.buildings}
     assert all(place.startswith("buildings[") for place in places)
+
+
+def test_a_layer_is_chosen_by_its_name(tmp_path: Path) -> None:
+    """Plots and houses of equal tags: only the houses are built."""
+    house = {"type": "Feature", "geometry": features()[0]["geometry"], "properties": {"id": 1}}
+    path = write(tmp_path / "town.gpkg", [house], "plots")
+    outlines = [feature for feature in features() if is_outline(feature)]
+    others = [feature for feature in features() if not is_outline(feature)]
+    write(path, outlines, "houses", append=True)
+    write(path, others, "roads", append=True)
+    found = import_site(path, replace(OPTIONS, buildings_from=("Layer=houses",)))
+    assert {building.place.partition("[")[0] for building in found.buildings} == {"houses"}
 
 
 @pytest.mark.filterwarnings("ignore:Normalized/laundered field name")  # of ten letters
