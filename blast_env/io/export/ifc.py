@@ -1,4 +1,4 @@
-"""Barriers of a layout in IFC4, as walls of the site, for building models."""
+"""Barriers of a layout in IFC4, as walls and other pieces of the site, for building models."""
 
 from collections.abc import Iterator, Mapping
 from itertools import count
@@ -12,7 +12,9 @@ from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece
 from blast_env.io.export.bill import MODULE, LayoutPlan, placed_elements
+from blast_env.io.importing.ifc import PIECE_SET
 from blast_env.layout.build_site import barrier_outline, outlines
+from blast_env.site.catalogue import Variant
 from blast_env.units import MODULE_SIDE_M
 
 with import_extra("ifc", "IFC files"):
@@ -20,14 +22,17 @@ with import_extra("ifc", "IFC files"):
     from ifcopenshell.guid import compress
 
 SCHEMA: Final = "IFC4"
-PROPERTY_SET: Final = "BlastEnv_Barrier"
-"""Set of the properties of a piece that no set of buildingSMART has."""
-
 _STRUCTURE_SET: Final = "BlastEnv_Structure"
+
+_WALL_RATIO: Final = 3
+"""Least length of a wall over its thickness. Bollards, blocks and planters are shorter."""
 
 
 def write_ifc(plan: LayoutPlan, path: Path) -> None:
-    """Write the pieces of a layout as walls of the site, and the structures for orientation.
+    """Write the pieces of a layout, and the structures for orientation.
+
+    A piece is an `IfcWall` of the site if it is three times as long as thick, else an
+    `IfcBuildingElementProxy`.
 
     Lengths are in metres, from the lower left corner of the site, z upwards.
 
@@ -38,6 +43,12 @@ def write_ifc(plan: LayoutPlan, path: Path) -> None:
     model.add()
     with write_atomically(path) as temporary:
         model.file.write(str(temporary))
+
+
+def _kind_of(variant: Variant) -> str:
+    """Return the class of a piece."""
+    thickness, length = sorted((variant.rows, variant.columns))
+    return "IfcWall" if length >= _WALL_RATIO * thickness else "IfcBuildingElementProxy"
 
 
 class _Model:
@@ -101,18 +112,18 @@ class _Model:
         items = {item.name: item for item in scenario.build_zone.items}
         for placed in placed_elements(self._plan):
             block = blocks[placed.rectangle_m]
-            wall = self._body(
-                "IfcWall",
+            piece = self._body(
+                _kind_of(placed.variant),
                 placed.name,
                 shapely.box(*placed.rectangle_m),
                 block.base_m,
                 block.height_m,
             )
             item = items.get(placed.element.item) if isinstance(placed.element, Piece) else None
-            wall.ObjectType = MODULE if item is None else item.name
-            wall.PredefinedType = "USERDEFINED"
+            piece.ObjectType = MODULE if item is None else item.name
+            piece.PredefinedType = "USERDEFINED"
             properties: dict[str, Any] = {
-                "Item": wall.ObjectType,
+                "Item": piece.ObjectType,
                 "Cost": placed.cost,
                 "StopsVehicles": placed.variant.stops_vehicles,
                 "AsHighAsTheAir": block.height_m is None,
@@ -130,8 +141,8 @@ class _Model:
                     "CrashSpeedKmH": rating.speed_km_h,
                     "CrashPenetrationM": rating.penetration_m,
                 }
-            self._describe(wall, PROPERTY_SET, properties)
-            yield wall
+            self._describe(piece, PIECE_SET, properties)
+            yield piece
 
     def _body(self, kind: str, name: str, plan: Any, base_m: float, height_m: float | None) -> Any:
         """Return an element that is an extruded plan."""

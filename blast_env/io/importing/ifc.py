@@ -34,6 +34,12 @@ _SHAPED: Final = (*_WALLS, "IfcSlab", "IfcRoof", "IfcCurtainWall", "IfcPlate", "
 _POSTS: Final = ("IfcColumn", "IfcMember", "IfcDoor", "IfcPile", "IfcFooting")
 """What else may stand on the ground below a building, or close a gap of its walls."""
 
+PIECE_SET: Final = "BlastEnv_Barrier"
+"""Set of the properties of a piece of a barrier that no set of buildingSMART has.
+
+An `IfcBuildingElementProxy` may be anything, a tree or the ground. With this set it is a piece.
+"""
+
 _PASSED: Final = ("IfcFeatureElement", "IfcSpace", "IfcSpatialZone", "IfcAnnotation", "IfcGrid")
 """Holes in walls, which are in their shapes, rooms and drawings."""
 
@@ -118,7 +124,7 @@ class _Model:
         chosen = {
             product.id(): product
             for product in self._products
-            if _is_any(product, (*_SHAPED, *_POSTS))
+            if _is_any(product, (*_SHAPED, *_POSTS)) or _is_piece(product)
         }
         solids = {
             product.element.id(): product for product in self._solids([*(chosen | panes).values()])
@@ -155,7 +161,7 @@ class _Model:
             triangles = corners[np.reshape(shape.geometry.faces, (-1, 3))]
             if len(triangles) and np.isfinite(triangles).all():
                 element = self._model.by_id(shape.id)
-                is_post = not _is_any(element, _SHAPED)
+                is_post = not (_is_any(element, _SHAPED) or _is_piece(element))
                 yield Solid(element, self._place(element), is_post, Faces.of_triangles(triangles))
             more = iterator.next()
 
@@ -255,9 +261,9 @@ class _Model:
         for solid in solids:
             if solid.is_post or is_window(solid):
                 continue
-            least_m = _LEAST_WALL_M if _is_any(solid.element, _WALLS) else None
+            is_wall = _is_any(solid.element, _WALLS) or _is_piece(solid.element)
+            least_m, kind = (_LEAST_WALL_M, "wall") if is_wall else (None, "yes")
             for part in solid.parts(ground_m, self._map.options.least_area_m2, least_m):
-                kind = "wall" if _is_any(solid.element, _WALLS) else "yes"
                 tags: Tags = {"building": kind, "name": str(solid.element.Name or "")}
                 extent_m = part.base_m - ground_m, part.top_m - ground_m
                 self._map.add(
@@ -297,6 +303,12 @@ def _is_object(product: Any) -> bool:
 
 def _is_any(element: Any, kinds: Sequence[str]) -> bool:
     return any(map(element.is_a, kinds))
+
+
+def _is_piece(element: Any) -> bool:
+    """Return whether an element is a piece of a barrier that is no wall."""
+    is_proxy = element.is_a("IfcBuildingElementProxy")
+    return bool(is_proxy and relations.get_pset(element, PIECE_SET))
 
 
 def _parts_of(element: Any) -> list[Any]:

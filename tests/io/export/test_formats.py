@@ -136,13 +136,14 @@ def test_barriers_in_ifc_have_mass_rating_and_cost(tmp_path: Path) -> None:
     path = export_layout(plan, tmp_path / "layout.ifc")
     model = ifcopenshell.open(str(path))
     sets = {
-        wall.Name: own["BlastEnv_Barrier"]
-        for wall in model.by_type("IfcWall")
-        if "BlastEnv_Barrier" in (own := get_psets(wall))
+        element.Name: own["BlastEnv_Barrier"] | {"class": element.is_a()}
+        for element in model.by_type("IfcElement")
+        if "BlastEnv_Barrier" in (own := get_psets(element))
     }
     wall, post = sets["wall_x4.250_y5.750"], sets["post_x4.250_y4.750"]
     assert (wall["Item"], wall["Cost"], wall["MassKg"]) == ("wall", 6.0, 2500.0)
     assert (wall["CrashRating"], wall["CrashSpeedKmH"]) == (RATING, 64.0)
+    assert (wall["class"], post["class"]) == ("IfcWall", "IfcBuildingElementProxy")
     assert wall["MassIsStated"] is True
     assert post["MassIsStated"] is False
     assert "CrashRating" not in post
