@@ -61,10 +61,15 @@ _ExportOption = Annotated[
     Path | None,
     typer.Option(
         help="Folder for the scene with loads as glTF, the histories as CSV and the field of "
-        "pressure for ParaView; or a file with one of these suffixes: .glb, .csv, .vti.",
+        "pressure for ParaView; or a file with one of these suffixes: .glb, .csv, .vti, .pvd (the "
+        "field in time).",
         callback=_note_export,
         rich_help_panel=_GAS,
     ),
+]
+_TimesOption = Annotated[
+    int | None,
+    typer.Option(help="Most times of --export to .pvd.", show_default="40", rich_help_panel=_GAS),
 ]
 _QuantityOption = Annotated[
     str | None,
@@ -119,6 +124,7 @@ def simulate(
         "Write a map of where windows and eardrums are at risk", *PICTURES, panel=_GAS
     ),
     export: _ExportOption = None,
+    times: _TimesOption = None,
     quantity: _QuantityOption = None,
     gauge: _GaugeOption = None,
     preset: _PresetOption = None,
@@ -137,7 +143,7 @@ def simulate(
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
-    files = _files(context, export)
+    files = _files(context, export, times)
     fixed = given.fixed(site, draw_threat(site, seed))
     blast: Any = used.blast(site, elements, seed, fixed)
     files.check(blast)
@@ -168,14 +174,16 @@ def _site_and_layout(
     return site.with_simulation(preset), elements
 
 
-def _files(context: typer.Context, export: Path | None) -> BlastFiles:
+def _files(context: typer.Context, export: Path | None, times: int | None) -> BlastFiles:
     """Return the files of the command line that are made while the blast runs, or after it."""
     names = [field.name for field in fields(BlastFiles) if field.name in context.params]
     files = BlastFiles(**{name: context.params[name] for name in names})
     if export is None:
+        if times is not None:
+            raise BlastEnvError("--times is for --export to .pvd, which is missing")
         return files
     check_blast_target(export)  # before the blast, so that it is not lost
-    return replace(files, further=blast_recorders(export))
+    return replace(files, further=blast_recorders(export, times))
 
 
 def _refuse_of_other_engines(context: typer.Context, engine: Engine) -> None:

@@ -80,37 +80,61 @@ def _write_field(result: "GasResult", path: Path) -> None:
     write_field(result, path)
 
 
+def _write_series(result: "GasResult", path: Path) -> None:
+    from blast_env.io.export.fields import write_series
+
+    write_series(result, path)
+
+
 _WRITERS: Final[Mapping[str, Callable[["GasResult", Path], object]]] = MappingProxyType(
     {
         ".glb": _write_scene,
         ".csv": lambda result, path: write_csv(history_table(result), path),
         ".vti": _write_field,
+        ".pvd": _write_series,
     }
 )
 _NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {".glb": "blast.glb", ".csv": "histories.csv", ".vti": "field.vti"}
 )
+"""Files of a folder: all but the series, which is large."""
 
 BLAST_SUFFIXES: Final = tuple(_WRITERS)
 """Suffixes of the formats of a blast."""
 
+SERIES_SUFFIX: Final = ".pvd"
+"""Suffix of the collection of a series of fields in time."""
 
-def blast_recorders(target: Path) -> "Recorders":
-    """Return what must record a blast for its export: the field of pressure, if it is asked for."""
-    if target.suffix.lower() in (".glb", ".csv"):
+
+def blast_recorders(target: Path, most_times: int | None = None) -> "Recorders":
+    """Return what must record a blast for its export: fields of pressure, if they are asked for.
+
+    Args:
+        target: As for `export_blast`.
+        most_times: Most times of a series; 40 unless given.
+
+    Raises:
+        BlastEnvError: If the number is given for another target than a series.
+    """
+    suffix = target.suffix.lower()
+    if most_times is not None and suffix != SERIES_SUFFIX:
+        raise BlastEnvError(f"a number of times is for a series (.pvd): target is {str(target)!r}")
+    if suffix in (".glb", ".csv"):
         return lambda _: ()
-    from blast_env.io.export.fields import field_recorders
+    from blast_env.io.export.fields import TIMES, field_recorders, series_recorders
 
-    return field_recorders
+    if suffix != SERIES_SUFFIX:
+        return field_recorders
+    return series_recorders(TIMES if most_times is None else most_times)
 
 
 def export_blast(result: "GasResult", target: Path) -> list[Path]:
-    """Write a blast in the format of the suffix, or in all formats to a folder.
+    """Write a blast in the format of the suffix, or in all formats but a series to a folder.
 
     Args:
         result: The blast, run with `blast_recorders(target)`.
-        target: `.glb` (site, barrier and loads), `.csv` (histories) or `.vti` (field of pressure);
-            otherwise a folder, created if it is missing.
+        target: `.glb` (site, barrier and loads), `.csv` (histories), `.vti` (field of pressure) or
+            `.pvd` (fields in time); otherwise a folder, created if it is missing.
 
     Returns:
         The files.

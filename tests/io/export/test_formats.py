@@ -1,6 +1,7 @@
 """glTF, IFC, VTK and CSV of layouts and blasts, read back by other readers."""
 
 import json
+import zlib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -211,7 +212,7 @@ def test_histories_end_with_the_loads_of_the_tables(tmp_path: Path) -> None:
 
 
 def image_of(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the attributes of an image and its arrays (nx, ny, nz)."""
+    """Return the attributes of an image and its arrays (nx, ny, nz), by the description of VTK."""
     head, _, rest = path.read_bytes().partition(b'<AppendedData encoding="raw">\n_')
     root = ElementTree.fromstring(head + b"</VTKFile>")
     image = root.find("ImageData")
@@ -221,8 +222,11 @@ def image_of(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     for array in image.iter("DataArray"):
         start = int(array.attrib["offset"])
         kind = {"Float32": "f4", "UInt8": "u1"}[array.attrib["type"]]
-        size = int(np.frombuffer(rest[start : start + 8], "<u8")[0])
-        values = np.frombuffer(rest[start + 8 : start + 8 + size], kind)
+        blocks, size, part, packed = np.frombuffer(rest[start : start + 32], "<u8").tolist()
+        assert (blocks, part) == (1, 0)
+        content = zlib.decompress(rest[start + 32 : start + 32 + packed])
+        assert len(content) == size
+        values = np.frombuffer(content, kind)
         arrays[array.attrib["Name"]] = values.reshape(shape, order="F")
     return dict(image.attrib), arrays
 
@@ -260,6 +264,55 @@ def test_a_field_is_read_by_vtk(tmp_path: Path) -> None:
     assert data.GetValue(number) == pytest.approx(arrays["peak_overpressure_pa"].max())
 
 
+def series(tmp_path: Path, most_times: int) -> tuple[GasResult, list[tuple[float, Path]]]:
+    """Return a blast, and the times and files of its series."""
+    path = tmp_path / "field.pvd"
+    made = GasEngine(cell_m=0.5).blast(hut(), MODULES, 0, draw_threat(hut(), 0))
+    result: GasResult = made.run(lambda _: None, blast_recorders(path, most_times))
+    assert export_blast(result, path) == [path]
+    entries = ElementTree.parse(path).getroot().iter("DataSet")
+    found = [(entry.attrib["timestep"], entry.attrib["file"]) for entry in entries]
+    return result, [(float(time), tmp_path / name) for time, name in found]
+
+
+def test_a_series_has_the_histories_of_the_gauges(tmp_path: Path) -> None:
+    """At each of its times, which are about equally far apart, until the end."""
+    result, found = series(tmp_path, 12)
+    times_s = np.array([time_s for time_s, _ in found])
+    assert 6 <= len(times_s) <= 12
+    steps_s = np.diff(times_s)
+    assert 0.5 * steps_s.mean() < steps_s.min() <= steps_s.max() < 1.5 * steps_s.mean()
+    assert times_s[-1] > result.run.time_s - 1.5 * steps_s.mean()
+    for time_s, path in found:
+        image, arrays = image_of(path)
+        assert set(arrays) == {"overpressure_pa", "is_solid"}
+        origin, spacing = (np.array(image[key].split(), float) for key in ("Origin", "Spacing"))
+        for gauge in result.gauges.itertuples():
+            place = np.array([gauge.x_m, gauge.y_m, gauge.z_m])
+            cell = tuple(np.floor((place - origin) / spacing).astype(int))
+            history = result.history(str(gauge.name))
+            at = int(np.argmin(np.abs(history["time_s"] - time_s)))
+            assert history["time_s"][at] == pytest.approx(time_s)
+            expected_pa = history["overpressure_pa"][at]
+            assert arrays["overpressure_pa"][cell] == pytest.approx(expected_pa, rel=1e-5, abs=0.1)
+        assert (arrays["overpressure_pa"][arrays["is_solid"] == 1] == 0.0).all()
+
+
+def test_a_series_has_a_largest_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    from blast_env.io.export import fields
+
+    scenario = hut()
+    made = GasEngine(cell_m=0.5).blast(scenario, MODULES, 0, draw_threat(scenario, 0))
+    monkeypatch.setattr(fields, "MOST_SERIES_BYTES", 1_000_000)
+    for target, times, words in (
+        ("a.pvd", 40, "must have at most 1,000,000: ask for fewer times or larger cells"),
+        ("a.pvd", 1, "times is 1, must be an integer from 2 to 1000"),
+        ("a.vti", 40, r"is for a series \(.pvd\): target is 'a.vti'"),
+    ):
+        with pytest.raises(BlastEnvError, match=words):
+            made.run(lambda _: None, blast_recorders(Path(target), times))
+
+
 def test_a_folder_gets_all_and_wrong_targets_are_named(tmp_path: Path) -> None:
     names = {path.name for path in export_blast(blast(), tmp_path / "out")}
     assert names == {"blast.glb", "histories.csv", "field.vti"}
@@ -267,5 +320,7 @@ def test_a_folder_gets_all_and_wrong_targets_are_named(tmp_path: Path) -> None:
         export_blast(blast(), tmp_path / "a.vtk")
     engine = GasEngine(cell_m=0.5)
     bare = engine.blast(hut(), (), 0, draw_threat(hut(), 0)).run(lambda _: None)
-    with pytest.raises(BlastEnvError, match="has no field: run it with"):
-        export_blast(bare, tmp_path / "field.vti")
+    for name in ("field", "series"):
+        suffix = {"field": ".vti", "series": ".pvd"}[name]
+        with pytest.raises(BlastEnvError, match=f"has no {name}: run it with"):
+            export_blast(bare, tmp_path / f"field{suffix}")
