@@ -20,6 +20,9 @@ KERB_SITES: Final = "kerb_sites"
 STREET_SITES: Final = "street_sites"
 """Name of streets along which a vehicle drives, of any size."""
 
+COURT_SITES: Final = "court_sites"
+"""Name of courts between several buildings, of any size."""
+
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
 """Those of an environment: all sites of a name have one size."""
 

@@ -77,8 +77,9 @@ def blasts(
     kind: Annotated[
         str,
         typer.Option(
-            help="item_sites, kerb_sites, street_sites, or with their side in m: close_sites/18, "
-            "front_sites/18 (only walls count that the blast comes from), large_sites/60."
+            help="sites, item_sites, kerb_sites, street_sites, court_sites, or with their side in "
+            "m: close_sites/18, front_sites/18 (only walls count that the blast comes from), "
+            "large_sites/60."
         ),
     ] = ITEM_SITES,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
         close_ranges,
         large_ranges,
     )
-    from blast_env.sites.kerb_sites import KerbSiteRanges, kerb_site, street_site
+    from blast_env.sites.kerb_sites import (
+        KerbSiteRanges,
+        court_site,
+        kerb_site,
+        street_site,
+    )
     from blast_env.sites.module_sites import SiteRanges
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
     from blast_env.sites.source import (
@@ -63,6 +68,7 @@ __all__ = [
     "Visibility",
     "VisibilityCriterion",
     "close_ranges",
+    "court_site",
     "cut_share_of",
     "draw_place",
     "draw_site",

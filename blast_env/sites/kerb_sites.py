@@ -47,6 +47,12 @@ STREET_ACROSS_M: Final[Span] = (9.0, 18.0)
 STREET_ALONG_M: Final[Span] = (10.0, 26.0)
 """Least and largest size along the street, m."""
 
+COURT_ACROSS_M: Final[Span] = (13.0, 24.0)
+"""Least and largest size of a court from the kerb to behind the front, m."""
+
+COURT_ALONG_M: Final[Span] = (12.0, 24.0)
+"""Least and largest size across that, m."""
+
 _HEIGHTS_M: Final = (0.8, 1.0, 1.0, 1.4, 2.0, 2.0, 2.5, 3.0, 3.6, 3.6, 4.0)
 """Heights of pieces of the catalogue and of T-walls."""
 
@@ -200,6 +206,34 @@ def street_site(seed: int) -> Scenario:
         vehicle_probability=1.0,
         kerb_m=(0.0, 2.0),
         zone_from_charge_m=(0.5, 1.0),
+    )
+    return generate_site(seed, ranges)
+
+
+def court_site(seed: int) -> Scenario:
+    """Return the site of a seed where a charge lies in a court between several buildings.
+
+    A wing at right angles to the front makes a re-entrant corner, if there is room for it.
+
+    Args:
+        seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
+    """
+    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 2)))
+    across_m, along_m = draws.length_m(COURT_ACROSS_M), draws.length_m(COURT_ALONG_M)
+    ranges = KerbSiteRanges(
+        across_m=across_m,
+        along_m=along_m,
+        tnt_kg=(30.0, 150.0),
+        depth_m=(2.0, 6.0),
+        front_share=(0.35, 0.75),
+        second_probability=0.7,
+        opposite_probability=0.6,
+        wing_probability=1.0,
+        all_faces_probability=0.5,
+        vehicle_probability=0.2,
     )
     return generate_site(seed, ranges)
 

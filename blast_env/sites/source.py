@@ -8,13 +8,20 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.bundled import ITEM_SITES, KERB_SITES, LARGE_SITES, SITES, STREET_SITES
+from blast_env.bundled import (
+    COURT_SITES,
+    ITEM_SITES,
+    KERB_SITES,
+    LARGE_SITES,
+    SITES,
+    STREET_SITES,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import MOST_SEED, RANGES, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
-from blast_env.sites.kerb_sites import kerb_site, street_site
+from blast_env.sites.kerb_sites import court_site, kerb_site, street_site
 from blast_env.sites.ranges import Ranges
 
 FAMILIES: Final[Mapping[str, Ranges]] = MappingProxyType(
@@ -27,6 +34,7 @@ SITE_KINDS: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
         **{name: partial(generate_site, ranges=ranges) for name, ranges in FAMILIES.items()},
         KERB_SITES: kerb_site,
         STREET_SITES: street_site,
+        COURT_SITES: court_site,
     }
 )
 """What makes a site from its seed, by the name of its kind: the families, and kinds of any size."""

@@ -7,7 +7,7 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.site import Scenario
-from blast_env.sites import KerbSiteRanges, generate_site, kerb_site, street_site
+from blast_env.sites import KerbSiteRanges, court_site, generate_site, kerb_site, street_site
 
 SEEDS = range(20_000, 20_012)
 
@@ -76,3 +76,19 @@ def test_a_vehicle_of_a_street_drives_along_the_front() -> None:
         }
         assert len(source.entries) == 2
         assert len(ends_m) == 4
+
+
+def test_most_courts_have_a_wing_that_makes_a_corner_with_the_front() -> None:
+    courts = tuple(map(court_site, SEEDS[:4]))
+    wings = [
+        (wing, front)
+        for site in courts
+        for wing in site.structures
+        for front in site.structures
+        if wing.name == "wing" and front.name == "building"
+    ]
+    assert len(wings) > len(courts) // 2
+    for wing, front in wings:
+        assert not wing.rectangle_m.overlaps(front.rectangle_m)
+        assert wing.rectangle_m.grown(0.1).overlaps(front.rectangle_m)
+    assert {len(site.structures) for site in courts} & {3, 4}
