@@ -218,6 +218,22 @@ def test_every_neighbour_is_legal_and_close(name: str, seed: int) -> None:
         layout = neighbour
 
 
+def test_neighbours_leave_out_what_is_illegal_in_a_layout() -> None:
+    """In the courtyard: a hydrant's cell, a cell twice, one outside the zone, over the stock."""
+    scenario, rng = load_scenario("courtyard"), np.random.default_rng(0)
+    wall = [(row, 12) for row in range(16)]
+    moves = Moves(scenario)
+    for layout in (
+        ((29, 11), *wall[:4]),
+        (*wall[:4], wall[0]),
+        ((40, 0), *wall[:4]),
+        (*wall, (30, 2)),
+    ):
+        for _ in range(20):
+            neighbour = moves.neighbour(layout, rng)
+            assert LayoutState.of(scenario, neighbour).cells == neighbour
+
+
 def test_a_whole_wall_can_move_at_once() -> None:
     scenario = site(stock=4)
     rng, moves = np.random.default_rng(0), Moves(scenario, count_share=0.0, wall_share=1.0)

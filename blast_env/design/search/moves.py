@@ -1,6 +1,7 @@
 """Small changes of layouts; every result is legal."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import cos, pi, sin
 from typing import Final
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray
 from blast_env.design.rules import random_element
+from blast_env.errors import LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.layout import LayoutState
 from blast_env.site import Catalogue, Scenario
@@ -20,13 +22,15 @@ Draw = Callable[[Scenario, np.random.Generator], Layout]
 _LEAST_WALL: Final = 2
 
 
-def legal_part(scenario: Scenario, layout: Iterable[Element]) -> LayoutState:
+def legal_part(scenario: Scenario, layout: Sequence[Element]) -> LayoutState:
     """Return the placement of a layout, in its order, without its illegal elements.
 
     Args:
         scenario: The scenario.
         layout: Modules or pieces; those on cells outside the zone are illegal.
     """
+    with suppress(LayoutError):
+        return LayoutState.of(scenario, layout)
     placement = LayoutState.empty(scenario)
     for element in layout:
         if _is_legal(placement, element):
@@ -134,7 +138,11 @@ class Moves:
         return tuple(sorted(layout))
 
     def neighbour(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Return a slightly different layout that satisfies all conditions of the zone."""
+        """Return a slightly different layout that satisfies all conditions of the zone.
+
+        Illegal elements of the layout are left out.
+        """
+        layout = legal_part(self.scenario, layout).layout
         if not layout:
             return self._added(layout, rng)
         # One draw decides the kind of move; the shares stack up on the interval from 0 to 1.
