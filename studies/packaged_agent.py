@@ -346,12 +346,13 @@ def train(
 
 
 def _guessed(agent: PackagedAgent, case: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return shares of the load by guesses: one proposal, the best draw, best rule, search."""
+    """Return shares of the load by guesses: policy, mean and best draw, best rule, search."""
     scenario = scenario_of(case["site"])
     charge = _charge_of(scenario, case)
     guesses = Guesses.of(packaged_surrogate(), case_for(scenario, charge))
     drawn = agent.sample(scenario, charge, DRAWS)
-    asked = [tuple(sorted(layout)) for layout in ((), agent.propose(scenario, charge), *drawn)]
+    likeliest = agent.likeliest(scenario, charge)
+    asked = [tuple(sorted(layout)) for layout in ((), likeliest, *drawn)]
     unprotected, one, *rest = guesses.loads(asked).tolist()
     shares = reductions(np.array([one, np.mean(rest), min(one, *rest)]), np.full(3, unprotected))
     return (*shares.tolist(), case["rule"], case["shares"][0])
@@ -359,7 +360,7 @@ def _guessed(agent: PackagedAgent, case: Mapping[str, Any]) -> tuple[float, ...]
 
 def _guessed_table(rows: Sequence[tuple[float, ...]]) -> str:
     mean = 100.0 * np.mean(np.array(rows), axis=0)
-    headers = ("cases", "one proposal", "mean draw", "best of 64 draws", "best rule", "search")
+    headers = ("cases", "the policy", "mean draw", "best of it and 64", "best rule", "search")
     return markdown_table(headers, [(str(len(rows)), *(f"{value:.1f} %" for value in mean))])
 
 
@@ -369,17 +370,19 @@ class Judged:
 
     Attributes:
         site: Name of the site.
-        one: Share of the agent's proposal.
-        ranked: Share of the best guess among it and its draws.
+        policy: Share of the policy's layout.
+        one: Share of the best guess among it and the rules' layouts.
+        ranked: Share of the best guess among these and the policy's draws.
         package: Share of the package's proposal.
         rule: Share of the best rule, which takes blasts of all rules to know.
-        one_promised: What the surrogate guesses for the agent's proposal.
-        promised: What it guesses for the best of the draws.
-        one_ms: CPU time of the proposal.
-        ranked_ms: CPU time of proposal, draws and guesses.
+        one_promised: What the surrogate guesses for `one`.
+        promised: What it guesses for `ranked`.
+        one_ms: CPU time of `one`.
+        ranked_ms: CPU time of `ranked`.
     """
 
     site: str
+    policy: float
     one: float
     ranked: float
     package: float
@@ -407,7 +410,9 @@ def judged(agent: PackagedAgent, cache: Path | None, charges: int, name: str) ->
         ranked_ms = MS_PER_S * (process_time() - begun_s)
         package = PackageProposer().propose(problem).layout
         rules = [*layouts_by_rule(scenario, charge).values()]
-        layouts = [tuple(sorted(layout)) for layout in (one, ranked, package, *rules)]
+        likeliest = agent.likeliest(scenario, charge)
+        tried = (one, ranked, likeliest, package, *rules)
+        layouts = [tuple(sorted(layout)) for layout in tried]
         shares = reductions_of(evaluator, problem.case, layouts)
         one_promised, promised = (
             promise(packaged_surrogate(), own, problem.case) for own in layouts[:2]
@@ -417,8 +422,9 @@ def judged(agent: PackagedAgent, cache: Path | None, charges: int, name: str) ->
                 site=name,
                 one=shares[0],
                 ranked=shares[1],
-                package=shares[2],
-                rule=max(shares[3:], default=0.0),
+                policy=shares[2],
+                package=shares[3],
+                rule=max(shares[4:], default=0.0),
                 one_promised=one_promised,
                 promised=promised,
                 one_ms=one_ms,
@@ -459,8 +465,8 @@ def judge(
                 found = [own for part in run_all(run, names, processes, progress) for own in part]
             rows.append(_judged_row(title, found))
             every += found
-    headers = ("on", "cases", "one proposal", "64 draws", "`propose`", "best rule of each")
-    leads = ("one beside the rule, points (95 %)", "64 beside the rule", "64 beside `propose`")
+    headers = ("on", "cases", "policy alone", "one proposal", "64 draws", "search by guesses")
+    leads = ("best rule of each", "one beside it, points (95 %)", "64 beside it")
     print_line(markdown_table((*headers, *leads, "one, 64 promised", "CPU ms"), rows))
     if by_site:
         print_line("\n" + _by_site(every))
@@ -478,15 +484,15 @@ def _judged_row(title: str, found: Sequence[Judged]) -> tuple[str, ...]:
     return (
         title,
         str(len(found)),
-        *(f"{share(name):.1f} %" for name in ("one", "ranked", "package", "rule")),
-        *(lead(*pair) for pair in (("one", "rule"), ("ranked", "rule"), ("ranked", "package"))),
+        *(f"{share(name):.1f} %" for name in ("policy", "one", "ranked", "package", "rule")),
+        *(lead(name, "rule") for name in ("one", "ranked")),
         f"{share('one_promised'):.1f}, {share('promised'):.1f} %",
         f"{median(own.one_ms for own in found):.0f}, {median(own.ranked_ms for own in found):.0f}",
     )
 
 
 def _by_site(found: Sequence[Judged]) -> str:
-    names = ("one", "one_promised", "ranked", "promised", "package", "rule")
+    names = ("policy", "one", "one_promised", "ranked", "promised", "package", "rule")
     rows = [(own.site, *(f"{100.0 * getattr(own, name):.1f}" for name in names)) for own in found]
     return markdown_table(("site", *(name.replace("_", " ") for name in names)), rows)
 

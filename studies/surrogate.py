@@ -35,6 +35,7 @@ from blast_env.site import Scenario, load_scenario
 from blast_env.sites import ITEM_SITES
 from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate.fitting import (
+    Begun,
     Errors,
     LoadErrors,
     Loads,
@@ -167,6 +168,12 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: 
 @app.command("fit")
 def fit_it(
     data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts.")] = None,
+    begin_with: Annotated[
+        Path | None, typer.Option(help="Surrogate that the fit goes on from; it is of --data.")
+    ] = None,
+    more: Annotated[
+        list[Path] | None, typer.Option(help="Tables that it has not seen, for --begin-with.")
+    ] = None,
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
@@ -183,9 +190,16 @@ def fit_it(
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
-        named = named_rows(data or DATA, without or ())
+        if (begin_with is None) != (not more):
+            raise BlastEnvError("--begin-with and --more go together: give both, or none")
+        named = named_rows([*(data or DATA), *(more or ())], without or ())
         samples = samples_of(named)
-        held_out = folds(samples.site, every, seed)[0]
+        is_more = np.isin(samples.scenario, named_rows(more)["scenario"] if more else [])
+        # The sites of --data that are held out stay so, whatever is added.
+        held_out = np.zeros(len(samples), dtype=bool)
+        for own in (~is_more, is_more):
+            held_out[own] = folds(samples.site[own], every, seed)[0] if own.any() else False
+        begun = None if begin_with is None else Begun(load_surrogate(begin_with), ~is_more)
         sites, least = len(np.unique(samples.site[held_out])), _HALVES * least_sites()
         if sites < least:
             raise BlastEnvError(
@@ -200,7 +214,7 @@ def fit_it(
             sites=len(np.unique(samples.site[~held_out])),
         )
         began_s = perf_counter()
-        fitted = fit(samples, ~held_out, epochs, seed, about, device=device)
+        fitted = fit(samples, ~held_out, epochs, seed, about, device=device, begun=begun)
         seconds = round(perf_counter() - began_s, 1)
         impulse, peak = (
             Holdout.of(fitted, networks, samples, loads, held_out, seed)

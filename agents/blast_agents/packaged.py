@@ -1,12 +1,13 @@
 """The packaged agent: one policy that places pieces on any site, without a blast.
 
 It was trained on generated sites, and looks at candidate places by their relations to charge,
-walls and pieces (`policies.candidates`). `python -m studies.packaged_agent` trains and judges it.
-It does without torch.
+walls and pieces (`policies.candidates`). What it proposes is the best guess of the surrogate among
+its layouts and those of the rules. `python -m studies.packaged_agent` trains and judges it. It
+does without torch.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
@@ -20,8 +21,9 @@ from safetensors.numpy import load, save
 
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
+from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, case_for
-from blast_env.design.search.package import LEAST_GAIN
+from blast_env.design.search.package import proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
@@ -29,7 +31,6 @@ from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.batch import LayoutBatch, PlacementRules
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
-from blast_env.statistics import reductions
 from blast_env.surrogate import packaged_surrogate
 from blast_env.values import generator, whole_number
 
@@ -150,6 +151,9 @@ class PackagedAgent:
 
     It serves every site with a build zone and a protected structure, with modules or a catalogue,
     against a known charge, a hidden one or a vehicle. Layouts keep all conditions of the zone.
+    Its methods take the scenario, or its bundled name or path, and the charge, if it is known;
+    otherwise layouts are for some of the possible ones. The policy takes a vehicle to be at its
+    worst place behind the rule's line of posts.
 
     Attributes:
         network: The network.
@@ -166,17 +170,20 @@ class PackagedAgent:
         return digest.hexdigest()[:16]
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
-        """Return the layout of the candidates with the highest scores; it is deterministic.
-
-        Args:
-            scenario: The scenario, or its bundled name or path; it has a build zone.
-            charge: The charge, if it is known; otherwise the layout is for some of the possible
-                ones. A vehicle is taken to be at its worst place behind the rule's line of posts.
+        """Return the best guess among the policy's layout, the rules' ones and none.
 
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
         """
-        return self._layouts(scenario, charge, 1, None)[0]
+        return self.ranked(scenario, charge, 0)[0]
+
+    def likeliest(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
+        """Return the policy's layout, of the candidates with the highest scores.
+
+        Raises:
+            BlastEnvError: As for `propose`.
+        """
+        return self._layouts(Candidates.of(find_scenario(scenario), charge), 1, None)[0]
 
     def sample(
         self,
@@ -185,19 +192,14 @@ class PackagedAgent:
         count: int = 8,
         seed: int = 0,
     ) -> tuple[Layout, ...]:
-        """Return layouts of candidates that are drawn by the softmax of their scores.
-
-        Args:
-            scenario: As for `propose`.
-            charge: As for `propose`.
-            count: Number of layouts; some may be equal.
-            seed: Seed of the draws.
+        """Return `count` layouts by draws from the softmax of the scores; some may be equal.
 
         Raises:
             BlastEnvError: As for `propose`, or if `count` is not a whole number from 1 to 10,000.
         """
         checked = whole_number("count", count, 1, MOST_DRAWS)
-        return self._layouts(scenario, charge, checked, generator(seed))
+        candidates = Candidates.of(find_scenario(scenario), charge)
+        return self._layouts(candidates, checked, generator(seed))
 
     def ranked(
         self,
@@ -206,32 +208,33 @@ class PackagedAgent:
         count: int = DRAWS,
         seed: int = 0,
     ) -> tuple[Layout, ...]:
-        """Return proposal and samples, sorted each, without repeats; the best guess comes first.
+        """Return the layouts of policy and rules, draws and none, the best guess first.
+
+        Each is sorted, and there once.
 
         Args:
-            scenario: As for `propose`.
-            charge: As for `propose`.
-            count: Number of samples.
-            seed: Seed of the samples.
+            scenario: The scenario.
+            charge: The charge, if it is known.
+            count: Number of draws, 0 to 10,000.
+            seed: Seed of the draws.
 
         Raises:
-            BlastEnvError: As for `sample`.
+            BlastEnvError: As for `propose`, or if `count` is no such number.
         """
-        found = find_scenario(scenario)
+        checked, found = whole_number("count", count, 0, MOST_DRAWS), find_scenario(scenario)
+        rules = layouts_by_rule(found, charge)
+        candidates = Candidates.of(found, charge, rules)
+        layouts: list[Layout] = [(), *rules.values(), *self._layouts(candidates, 1, None)]
+        if checked:
+            layouts += self._layouts(candidates, checked, generator(seed))
         guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
-        drawn = (self.propose(found, charge), *self.sample(found, charge, count, seed))
-        guesses.loads([tuple(sorted(layout)) for layout in drawn])
+        guesses.loads([tuple(sorted(layout)) for layout in layouts])
         return tuple(guesses.ranked())
 
     def _layouts(
-        self,
-        scenario: AnyScenario,
-        charge: AnyCharge | None,
-        count: int,
-        rng: np.random.Generator | None,
+        self, candidates: Candidates, count: int, rng: np.random.Generator | None
     ) -> tuple[Layout, ...]:
         """Return layouts, drawn or, without a generator, of the highest scores."""
-        candidates = Candidates.of(find_scenario(scenario), charge)
         prepared = self.network.prepared(candidates.static)
         rules = PlacementRules.of(candidates.empty)
         batch = LayoutBatch(candidates.empty, rules, count)
@@ -296,7 +299,7 @@ def packaged_agent() -> PackagedAgent:
 
 @dataclass(frozen=True)
 class AgentProposer:
-    """Proposes the best guess among the packaged agent's layout and draws, without a blast.
+    """Proposes the best guess of `PackagedAgent.ranked`, without a blast.
 
     Attributes:
         draws: Number of draws.
@@ -313,26 +316,14 @@ class AgentProposer:
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
-        """Return the layout and its expected gain; empty below `LEAST_GAIN`.
-
-        Args:
-            problem: The problem.
-            budget: Most blasts, none of which is spent.
-            seed: Seed of the draws.
-            report: Called with the progress.
+        """Return the layout as `proposed` has it; the arguments are those of a `Proposer`.
 
         Raises:
             BlastEnvError: If the site has no build zone, or no structure is protected.
         """
-        scenario, charge = problem.scenario, problem.known_charge
-        surrogate, agent = packaged_surrogate(), packaged_agent()
-        layout = agent.ranked(scenario, charge, self.draws, seed)[0]
-        guesses = Guesses.of(surrogate, case_for(scenario, charge))
-        gain = reductions(*guesses.loads([layout, ()])).item()
-        by = f"the packaged agent, the best guess of {self.draws} draws"
-        if not gain >= LEAST_GAIN:  # NaN: nothing arrives
-            by = f"{by}: an expected reduction of {100.0 * gain:.1f} % at best"
-            layout, gain = (), 0.0
+        charge = problem.known_charge
+        layout = packaged_agent().ranked(problem.scenario, charge, self.draws, seed)[0]
         if report is not None:
             report(Progress(0, 0, guessed=1.0))
-        return SearchResult(layout, self.name, by, gain, budget=budget, seed=seed)
+        by = f"the packaged agent, the best guess of the rules' layouts and {self.draws} draws"
+        return replace(proposed(problem, layout, by), method=self.name, budget=budget, seed=seed)

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from blast_env.surrogate.engine import SurrogateEngine
     from blast_env.surrogate.fitting import (
         MEMBERS,
+        Begun,
         Predictions,
         Samples,
         errors,
@@ -45,6 +46,7 @@ __all__ = [
     "SHAPES",
     "SHARES",
     "STATIONS",
+    "Begun",
     "Check",
     "Correction",
     "Fit",

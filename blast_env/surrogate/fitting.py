@@ -50,6 +50,9 @@ _DECAY: Final = 1e-3
 _MOST_GRADIENT: Final = 1.0
 """Bound on the norm of a gradient, against outliers among the groups."""
 
+_AGAIN: Final = 4
+"""In a fit that goes on, a pass has one in so many of the earlier samples; so falls the rate."""
+
 _LEAST_SCALE: Final = 1e-3
 _LEAST_CASE: Final = 4
 """Least number of layouts of a case for its rank correlation."""
@@ -181,6 +184,7 @@ def fit(
     members: int = MEMBERS,
     peaks: bool = True,
     device: str = "cpu",
+    begun: "Begun | None" = None,
 ) -> Surrogate:
     """Fit the networks to some of the samples, two networks at a time.
 
@@ -193,29 +197,60 @@ def fit(
         members: Number of networks per kind of load.
         peaks: Whether to fit the networks for peaks, too.
         device: Device of torch; the fit depends on it by rounding.
+        begun: The surrogate that the fit goes on from, and what that one was fitted to.
     """
-    points = samples.features[np.repeat(chosen, samples.counts)]
-    solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
-    mean = np.concatenate([array.mean(axis=0, dtype=np.float64) for array in (points, solids)])
-    scale = np.concatenate([item.std(axis=0, dtype=np.float64) for item in (points, solids)])
-    scale += _LEAST_SCALE
-    cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
-    own = [case for case in cases if len(case)]
+    old = np.zeros(len(samples), dtype=bool) if begun is None else begun.samples
+    if begun is None:
+        mean, scale = _scales(samples, chosen)
+    else:
+        mean, scale = begun.surrogate.mean, begun.surrogate.scale
+    own, again = (_cases(samples, chosen & mask) for mask in (~old, old))
     tensors = _Tensors.of(samples, mean, scale, device)
-    of_both = (samples.impulse, samples.peak) if peaks else (samples.impulse,)
     tasks = []
-    for loads in of_both:
+    for loads, kind in ((samples.impulse, "impulse"), (samples.peak, "peak"))[: 1 + peaks]:
         for number in range(members):
             torch.manual_seed(seed + number)
-            tasks.append((_Network().to(device), _Target.of(loads, device), seed + number))
+            network = _Network()
+            if begun is not None:
+                network.take(getattr(begun.surrogate, kind).members[number])
+            tasks.append((network.to(device), _Target.of(loads, device), seed + number))
 
     def fitted(task: tuple["_Network", "_Target", int]) -> Member:
-        return _fitted(tensors, own, epochs, *task)
+        return _fitted(tensors, own, again, epochs, *task)
 
     with ThreadPoolExecutor(2) as pool:
         found = [*pool.map(fitted, tasks)]
     impulse, peak = found[:members], found[members:]
     return Surrogate(mean, scale, Networks(impulse), Networks(peak), about)
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A surrogate that a fit goes on from.
+
+    Attributes:
+        surrogate: The surrogate.
+        samples: Mask of the samples of its own data (samples,). A pass has a quarter of them,
+            drawn anew, so that it does not forget them.
+    """
+
+    surrogate: Surrogate
+    samples: BoolArray
+
+
+def _scales(samples: Samples, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard deviation of features and relations (INPUTS,)."""
+    points = samples.features[np.repeat(chosen, samples.counts)]
+    solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
+    mean = np.concatenate([array.mean(axis=0, dtype=np.float64) for array in (points, solids)])
+    scale = np.concatenate([item.std(axis=0, dtype=np.float64) for item in (points, solids)])
+    return mean, scale + _LEAST_SCALE
+
+
+def _cases(samples: Samples, chosen: BoolArray) -> list[IntArray]:
+    """Return the indices of the chosen samples of each case that has some."""
+    cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
+    return [case for case in cases if len(case)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -472,6 +507,12 @@ class _Network(nn.Module):
         said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
         return said
 
+    def take(self, member: Member) -> None:
+        """Take over weights and biases."""
+        with torch.no_grad():
+            for parameter, array in zip(self.parameters(), member, strict=True):
+                parameter.copy_(torch.from_numpy(np.ascontiguousarray(array.T)))
+
     def plain(self) -> Member:
         """Return the weights and biases as arrays."""
         arrays: Sequence[FloatArray] = [
@@ -483,23 +524,26 @@ class _Network(nn.Module):
 def _fitted(
     data: _Tensors,
     cases: Sequence[IntArray],
+    again: Sequence[IntArray],
     epochs: int,
     network: _Network,
     target: _Target,
     seed: int,
 ) -> Member:
-    """Fit one network to the samples of some cases."""
+    """Fit one network to the samples of some cases, and to some of those that it has met."""
     rng = np.random.default_rng(seed)
-    optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
-    groups = [
-        group
-        for case in cases
-        for group in np.array_split(rng.permutation(case), ceil(len(case) / _GROUP))
-    ]
-    batches = max(1, round(len(groups) / _BATCH))
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
+    groups, met = _groups(cases, rng), _groups(again, rng)
+    drawn, new = len(met) // _AGAIN, np.arange(len(groups))
+    rate = _RATE / _AGAIN if met else _RATE
+    groups += met
+    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=_DECAY)
+    batches = max(1, round((len(new) + drawn) / _BATCH))
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=epochs * batches)
     for epoch in range(epochs):
-        for batch in np.array_split(rng.permutation(len(groups)), batches):
+        shown = new
+        if met:
+            shown = np.append(new, len(new) + rng.choice(len(met), drawn, replace=False))
+        for batch in np.array_split(rng.permutation(shown), batches):
             loss = data.loss(network, target, [groups[number] for number in batch])
             if not torch.isfinite(loss):
                 raise BlastEnvError(f"network of seed {seed} in epoch {epoch}: no finite error")
@@ -509,3 +553,12 @@ def _fitted(
             optimizer.step()
             schedule.step()
     return network.plain()
+
+
+def _groups(cases: Sequence[IntArray], rng: np.random.Generator) -> list[IntArray]:
+    """Return the samples of cases in groups of a few, drawn anew."""
+    return [
+        group
+        for case in cases
+        for group in np.array_split(rng.permutation(case), ceil(len(case) / _GROUP))
+    ]

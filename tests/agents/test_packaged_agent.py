@@ -14,7 +14,7 @@ from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.design import expected_charge, random_layout
 from blast_env.design.proposal import problem_of
-from blast_env.design.search import Guesses
+from blast_env.design.search import Guesses, layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, LoadCaseSet
 from blast_env.layout import LayoutState, load_layout
@@ -46,12 +46,14 @@ def guesses_of(scenario: Scenario, charge: AnyCharge) -> Guesses:
 def test_its_layouts_keep_every_condition_of_any_zone(scenario: Scenario, is_known: bool) -> None:
     charge: AnyCharge | None = draw_threat(scenario, 0) if is_known else None
     agent = packaged_agent()
-    layout, drawn = agent.propose(scenario, charge), agent.sample(scenario, charge, 6, 1)
+    layout, drawn = agent.likeliest(scenario, charge), agent.sample(scenario, charge, 6, 1)
+    proposed = agent.propose(scenario, charge)
     assert layout
     assert len(drawn) == 6
-    for own in (layout, *drawn):
+    for own in (layout, proposed, *drawn):
         assert LayoutState.of(scenario, own).layout == own
-    assert agent.propose(scenario, charge) == layout
+    assert agent.likeliest(scenario, charge) == layout
+    assert agent.propose(scenario, charge) == proposed
     assert agent.sample(scenario, charge, 6, 1) == drawn
     assert agent.sample(scenario, charge, 6, 2) != drawn
 
@@ -63,9 +65,19 @@ def test_layouts_that_are_drawn_differ_and_the_first_one_of_the_ranked_has_the_b
     guesses = guesses_of(CONTROL_ROOM, charge)
     loads = guesses.loads(ranked)
     assert (np.diff(loads) >= 0.0).all()
-    assert loads[0] <= guesses.loads(
-        [tuple(sorted(packaged_agent().propose(CONTROL_ROOM, charge)))]
-    )
+    assert loads[0] <= guesses.loads([packaged_agent().propose(CONTROL_ROOM, charge)])
+    assert packaged_agent().ranked(CONTROL_ROOM, charge, 8) == ranked
+
+
+def test_a_proposal_is_behind_no_rule_and_not_behind_the_policy_by_guesses() -> None:
+    for scenario in (CONTROL_ROOM, SITES["vehicle"]):
+        charge = draw_threat(scenario, 0)
+        likeliest = tuple(sorted(packaged_agent().likeliest(scenario, charge)))
+        others = [(), likeliest, *layouts_by_rule(scenario, charge).values()]
+        own, *loads = guesses_of(scenario, charge).loads(
+            [packaged_agent().propose(scenario, charge), *others]
+        )
+        assert own <= min(loads)
 
 
 def test_it_is_better_by_guesses_than_random_layouts_on_sites_that_it_has_not_seen() -> None:
@@ -76,7 +88,7 @@ def test_it_is_better_by_guesses_than_random_layouts_on_sites_that_it_has_not_se
         guesses = guesses_of(scenario, charge)
         rng = np.random.default_rng(seed)
         random = [tuple(sorted(random_layout(scenario, rng))) for _ in range(8)]
-        proposed = tuple(sorted(packaged_agent().propose(scenario, charge)))
+        proposed = tuple(sorted(packaged_agent().likeliest(scenario, charge)))
         unprotected, own, *others = guesses.loads([(), proposed, *random]) / guesses.loads([()])
         ahead.append(np.mean(others) - own)
         assert own < unprotected
@@ -110,7 +122,7 @@ def test_weights_come_back_from_their_file(tmp_path: Path) -> None:
     again = load_packaged(path)
     assert again.digest == agent.digest
     assert isinstance(again, PackagedAgent)
-    assert again.propose(CONTROL_ROOM) == agent.propose(CONTROL_ROOM)
+    assert again.likeliest(CONTROL_ROOM) == agent.likeliest(CONTROL_ROOM)
     content = path.read_bytes()
     length = int.from_bytes(content[:8], "little")
     header = json.loads(content[8 : 8 + length])
@@ -151,7 +163,7 @@ def test_the_command_writes_the_best_of_the_draws(tmp_path: Path) -> None:
     options = ("--method", "agent", "--scenario", "control_room", "--charge", "2,8.5")
     result = CliRunner().invoke(app, ["search", *options, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert "by the packaged agent, the best guess of 64 draws" in result.output
+    assert "the packaged agent, the best guess of the rules' layouts and 64 draws" in result.output
     mean = expected_charge(CONTROL_ROOM.charge)
     charge = Charge((2.0, 8.5), mean.tnt_kg, mean.height_m)
     problem = problem_of(CONTROL_ROOM, charge)

@@ -41,6 +41,7 @@ from blast_env.surrogate import (
     SHAPES,
     SHARES,
     STATIONS,
+    Begun,
     Check,
     Fit,
     Member,
@@ -440,6 +441,14 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     once, again = (fit(samples, ~held[0], 1, 0, ABOUT) for _ in range(2))
     assert len(once.impulse.members) == len(once.peak.members) == MEMBERS
     assert once.digest == again.digest
+    begun = Begun(learnt, ~held[0] & ~held[1])
+    more = fit(samples, ~held[0], 2, 0, ABOUT, 2, begun=begun)
+    assert more.digest != learnt.digest
+    first, went_on, afresh = (
+        load_errors(found, found.impulse, samples, samples.impulse, held[0]).within
+        for found in (learnt, more, once)
+    )
+    assert went_on < min(1.5 * first, 0.5 * afresh)
 
 
 def test_it_learns_from_messages_what_ways_do_not_see() -> None:

@@ -6,7 +6,7 @@ stand, in the frame of the line from the charge to the walls. So a turned or mir
 same features, and their number does not depend on the site.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -15,6 +15,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.design.bollards import line_of_posts, posts_and_wall
+from blast_env.design.search.by_rule import RULES
 from blast_env.design.search.learnt import case_for
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Rectangle
@@ -162,13 +163,19 @@ class Candidates:
     is_post: BoolArray
 
     @classmethod
-    def of(cls, scenario: Scenario, charge: AnyCharge | None) -> "Candidates":
+    def of(
+        cls,
+        scenario: Scenario,
+        charge: AnyCharge | None,
+        rules: Mapping[str, Layout] | None = None,
+    ) -> "Candidates":
         """Return the candidates of a site.
 
         Args:
             scenario: The scenario; it has a build zone and a protected structure.
             charge: The charge, or `None` for some of the possible ones. A vehicle is at the worst
                 place behind the line of posts of the rule, if there is one.
+            rules: The layouts of all rules by title, if they are at hand.
 
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
@@ -176,7 +183,7 @@ class Candidates:
         zone, empty = scenario.zone, LayoutState.empty(scenario)
         walls = _protected_walls(scenario)
         threats = case_for(scenario, charge).threats
-        posts, walled = _by_rule(scenario, charge)
+        posts, walled = _against_vehicles(scenario, charge, rules)
         charges = list(dict.fromkeys(threat.charge_against(scenario, posts) for threat in threats))
         # 1. Where the candidates are, and what they are.
         catalogue = empty.catalogue
@@ -377,19 +384,28 @@ def _way_over_m(
     return np.hypot(there_m, rise_m) + np.hypot(distance_m - there_m, rise_m) - distance_m
 
 
-def _by_rule(scenario: Scenario, charge: AnyCharge | None) -> tuple[Layout, Layout]:
+def _against_vehicles(
+    scenario: Scenario, charge: AnyCharge | None, rules: Mapping[str, Layout] | None
+) -> tuple[Layout, Layout]:
     """Return the layouts of the rules against vehicles, empty where they have none.
 
     How posts close a way depends on all of them together, which relations of pairs do not show.
     """
     found: list[Layout] = []
-    for rule in (line_of_posts, posts_and_wall):
+    for title, rule in _AGAINST_VEHICLES:
         layout: Layout = ()
-        if scenario.vehicles:
+        if rules is not None:
+            layout = rules.get(title, ())
+        elif scenario.vehicles:
             with suppress(BlastEnvError):  # no posts in stock, or no way for a vehicle
                 layout = rule(scenario, charge)
         found.append(layout)
     return found[0], found[1]
+
+
+_AGAINST_VEHICLES: Final = tuple(
+    (RULES[rule.__name__].title, rule) for rule in (line_of_posts, posts_and_wall)
+)
 
 
 def _in_reach(scenario: Scenario, boxes_m: FloatArray) -> FloatArray:

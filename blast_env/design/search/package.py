@@ -44,8 +44,7 @@ class PackageProposer:
     ) -> SearchResult:
         """Return the layout, its predicted gain, and its source in `by`.
 
-        The layout is empty if the predicted gain is below `LEAST_GAIN`. It is compared with those
-        of the rules: see `worth_its_pieces`.
+        See `proposed`.
 
         Args:
             problem: The problem.
@@ -57,18 +56,33 @@ class PackageProposer:
         from blast_env.design.search.learnt import search_by
         from blast_env.surrogate import packaged_surrogate
 
-        result = search_by(packaged_surrogate()).propose(problem, 0, seed, report)
-        by, guesses = "the surrogate of gas dynamics", _guesses(problem)
-        rules = layouts_by_rule(problem.scenario, problem.known_charge)
-        layout = worth_its_pieces(guesses, result.layout, rules.values())
-        gain = reductions(*guesses.loads([layout, ()])).item()
-        if not gain >= LEAST_GAIN:  # NaN: nothing arrives
-            by = (
-                f"{by}: barriers bring little here, an expected reduction of {100.0 * gain:.1f} % "
-                f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_remedy(problem)}"
-            )
-            layout, gain = (), 0.0
-        return replace(result, method=self.name, by=by, layout=layout, gain=gain, budget=budget)
+        found = search_by(packaged_surrogate()).propose(problem, 0, seed, report)
+        result = proposed(problem, found.layout, "the surrogate of gas dynamics")
+        return replace(result, method=self.name, budget=budget, seed=seed)
+
+
+def proposed(problem: DesignProblem, layout: Layout, by: str) -> SearchResult:
+    """Return a layout as a proposal by guesses, with its predicted gain.
+
+    It is without useless pieces, or that of a better rule (`worth_its_pieces`), and empty if the
+    predicted gain is below `LEAST_GAIN`.
+
+    Args:
+        problem: The problem.
+        layout: The layout.
+        by: What it is from, in words.
+    """
+    guesses, charge = _guesses(problem), problem.known_charge
+    rules = layouts_by_rule(problem.scenario, charge).values()
+    layout = worth_its_pieces(guesses, layout, rules)
+    gain = reductions(*guesses.loads([layout, ()])).item()
+    if not gain >= LEAST_GAIN:  # NaN: nothing arrives
+        by = (
+            f"{by}: barriers bring little here, an expected reduction of {100.0 * gain:.1f} % "
+            f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_remedy(problem)}"
+        )
+        layout, gain = (), 0.0
+    return SearchResult(layout, by=by, gain=gain)
 
 
 def _remedy(problem: DesignProblem) -> str:
