@@ -30,6 +30,7 @@ _ORIGINS: Final = {
     "front_site_blasts": "such sites on which only the walls count that the blast comes from",
     "kerb_site_blasts": "generated sites along a kerb, with walls opposite and vehicles",
     "street_site_blasts": "streets open at both ends, where a vehicle drives along the fronts",
+    "module_site_blasts": "generated sites of single modules, and courts between buildings",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)

@@ -360,7 +360,7 @@ def _guessed(agent: PackagedAgent, case: Mapping[str, Any]) -> tuple[float, ...]
 
 def _guessed_table(rows: Sequence[tuple[float, ...]]) -> str:
     mean = 100.0 * np.mean(np.array(rows), axis=0)
-    headers = ("cases", "the policy", "mean draw", "best of it and 64", "best rule", "search")
+    headers = ("cases", "the policy", "mean draw", f"best of it and {DRAWS}", "best rule", "search")
     return markdown_table(headers, [(str(len(rows)), *(f"{value:.1f} %" for value in mean))])
 
 
@@ -372,7 +372,7 @@ class Judged:
         site: Name of the site.
         policy: Share of the policy's layout.
         one: Share of the best guess among it and the rules' layouts.
-        ranked: Share of the best guess among these and the policy's draws.
+        ranked: Share of the best guess among these, the policy's draws and changes.
         package: Share of the package's proposal.
         rule: Share of the best rule, which takes blasts of all rules to know.
         one_promised: What the surrogate guesses for `one`.
@@ -465,9 +465,9 @@ def judge(
                 found = [own for part in run_all(run, names, processes, progress) for own in part]
             rows.append(_judged_row(title, found))
             every += found
-    headers = ("on", "cases", "policy alone", "one proposal", "64 draws", "search by guesses")
-    leads = ("best rule of each", "one beside it, points (95 %)", "64 beside it")
-    print_line(markdown_table((*headers, *leads, "one, 64 promised", "CPU ms"), rows))
+    headers = ("on", "cases", "policy alone", "one proposal", "draws and changes", "package")
+    leads = ("best rule of each", "one beside it, points (95 %)", "draws beside it")
+    print_line(markdown_table((*headers, *leads, "one, draws promised", "CPU ms"), rows))
     if by_site:
         print_line("\n" + _by_site(every))
 

@@ -22,7 +22,7 @@ from safetensors.numpy import load, save
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.by_rule import layouts_by_rule
-from blast_env.design.search.learnt import Guesses, case_for
+from blast_env.design.search.learnt import Guesses, case_for, improved
 from blast_env.design.search.package import proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
@@ -40,8 +40,11 @@ Weights = Mapping[str, NDArray[np.float32]]
 WEIGHTS: Final = "packaged_agent.safetensors"
 """Name of the file of the weights, in this package."""
 
-DRAWS: Final = 64
+DRAWS: Final = 32
 """Layouts that the agent draws where guesses choose among them."""
+
+CHANGES: Final = 120
+"""Changes of the best guesses that are looked at after that."""
 
 MOST_DRAWS: Final = 10_000
 """Largest number of layouts of one call."""
@@ -175,7 +178,7 @@ class PackagedAgent:
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
         """
-        return self.ranked(scenario, charge, 0)[0]
+        return self.ranked(scenario, charge, 0, changes=0)[0]
 
     def likeliest(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the policy's layout, of the candidates with the highest scores.
@@ -207,29 +210,32 @@ class PackagedAgent:
         charge: AnyCharge | None = None,
         count: int = DRAWS,
         seed: int = 0,
+        changes: int = CHANGES,
     ) -> tuple[Layout, ...]:
-        """Return the layouts of policy and rules, draws and none, the best guess first.
+        """Return the layouts of policy and rules, draws, none and changes, the best guess first.
 
-        Each is sorted, and there once.
+        Changes are of the best guesses so far, as in a search by guesses alone. Each layout is
+        sorted, and there once.
 
         Args:
             scenario: The scenario.
             charge: The charge, if it is known.
             count: Number of draws, 0 to 10,000.
-            seed: Seed of the draws.
+            seed: Seed of draws and changes.
+            changes: Number of changes, 0 to 10,000.
 
         Raises:
-            BlastEnvError: As for `propose`, or if `count` is no such number.
+            BlastEnvError: As for `propose`, or if a number is out of bounds.
         """
+        most = whole_number("changes", changes, 0, MOST_DRAWS)
         checked, found = whole_number("count", count, 0, MOST_DRAWS), find_scenario(scenario)
+        guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
         rules = layouts_by_rule(found, charge)
         candidates = Candidates.of(found, charge, rules)
         layouts: list[Layout] = [(), *rules.values(), *self._layouts(candidates, 1, None)]
         if checked:
             layouts += self._layouts(candidates, checked, generator(seed))
-        guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
-        guesses.loads([tuple(sorted(layout)) for layout in layouts])
-        return tuple(guesses.ranked())
+        return tuple(improved(guesses, layouts, most, generator(seed)))
 
     def _layouts(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None
@@ -325,5 +331,8 @@ class AgentProposer:
         layout = packaged_agent().ranked(problem.scenario, charge, self.draws, seed)[0]
         if report is not None:
             report(Progress(0, 0, guessed=1.0))
-        by = f"the packaged agent, the best guess of the rules' layouts and {self.draws} draws"
+        by = (
+            "the packaged agent, the best guess of the rules' layouts, "
+            f"{self.draws} draws and changes of them"
+        )
         return replace(proposed(problem, layout, by), method=self.name, budget=budget, seed=seed)

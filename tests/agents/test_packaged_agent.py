@@ -163,7 +163,7 @@ def test_the_command_writes_the_best_of_the_draws(tmp_path: Path) -> None:
     options = ("--method", "agent", "--scenario", "control_room", "--charge", "2,8.5")
     result = CliRunner().invoke(app, ["search", *options, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert "the packaged agent, the best guess of the rules' layouts and 64 draws" in result.output
+    assert "the best guess of the rules' layouts, 32 draws and changes of them" in result.output
     mean = expected_charge(CONTROL_ROOM.charge)
     charge = Charge((2.0, 8.5), mean.tnt_kg, mean.height_m)
     problem = problem_of(CONTROL_ROOM, charge)

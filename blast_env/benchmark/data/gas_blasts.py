@@ -19,6 +19,7 @@ TABLES: Final = (
     "front_site_blasts",
     "kerb_site_blasts",
     "street_site_blasts",
+    "module_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
