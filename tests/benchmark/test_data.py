@@ -1,6 +1,7 @@
 """The gas blasts as a data set: what its card promises of every row."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,13 @@ def test_every_row_is_what_the_card_says(rows: pd.DataFrame) -> None:
     assert all(isinstance(json.loads(value), list) for value in rows["layout"].unique()[:500])
     bare = rows[rows["layout"] == "[]"]
     np.testing.assert_allclose(bare["impulse_pa_s"], bare["unprotected_impulse_pa_s"], rtol=0.01)
+
+
+def test_every_table_is_in_the_wheel() -> None:
+    content = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))
+    included = content["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    for path in sources():
+        assert included[f"docs/data/{path.name}"] == f"blast_env/benchmark/data/tables/{path.name}"
 
 
 def test_tensors_leave_out_what_has_no_bare_load(rows: pd.DataFrame) -> None:
