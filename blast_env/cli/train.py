@@ -116,8 +116,10 @@ def train(
     if resume is not None:
         fixed = {parameter.name or "" for parameter in context.command.params} - {*_WITH_RESUME}
         refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
-    # Here, because torch takes seconds to start, and is an extra; not below, because before it
-    # there is nothing to resume.
+    else:
+        site = scenario_source(scenario or _DEFAULT_SCENARIO).representative
+    # Here, because torch takes seconds to start, and is an extra; not above, because a site that is
+    # no site is refused at once; not below, because before it there is nothing to resume.
     with import_extra("agents,render", "training"), Interruptions.current().at_once():
         import blast_agents.training  # noqa: F401
     with running_on(cluster), resumable(partial(_how_to_resume, folder)):
@@ -133,6 +135,7 @@ def train(
                 folder,
                 algo or _DEFAULT_ALGORITHM,
                 scenario or _DEFAULT_SCENARIO,
+                site,
                 known,
                 changes,
                 envs,
@@ -160,11 +163,22 @@ def _train(
     run: Path,
     algorithm: str,
     scenario: str,
+    site: Scenario,
     given: Mapping[str, Any],
     set_to: Sequence[str],
     envs: int | None,
 ) -> "TrainingResult":
-    """Train in a new run folder, with settings and changes other than the defaults."""
+    """Train in a new run folder, with settings and changes other than the defaults.
+
+    Args:
+        run: The folder.
+        algorithm: Name of the algorithm.
+        scenario: Name or path of the scenario, or the name of generated sites.
+        site: The scenario, or one of the generated sites.
+        given: The settings given as options of their own.
+        set_to: The changes given as `key=value`.
+        envs: Number of parallel environments, if given.
+    """
     from blast_agents.training import load_hyperparameters, train
     from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
     from blast_agents.training.run_folder import SETTING_KEYS, environment_id, settings_from
@@ -172,7 +186,6 @@ def _train(
     changes = parse_options(set_to, [*hyperparameter_keys(), *SETTING_KEYS])
     if given.get("observation") in _POLICIES:
         changes.setdefault("policy", _POLICIES[given["observation"]])
-    site = scenario_source(scenario).representative
     values = {"engine": default_engine("train", site), **given}
     values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
     hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)

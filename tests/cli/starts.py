@@ -2,7 +2,7 @@
 
     python tests/cli/starts.py OUT ARGUMENTS [-- ARGUMENTS ...]
 
-At some audit events of Python (imports, files opened, code run), most of them early ones, a copy of
+At some audit events of Python (imports, files opened, code run), always fewer of them, a copy of
 the process receives SIGINT or SIGTERM, by turns. OUT gets a line of JSON for each copy: command,
 event, signal, exit code, and what it wrote. The first command starts from nothing. The
 others start where it has ended, because most of their imports are its own.
@@ -17,8 +17,8 @@ from itertools import groupby
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-DENSITIES = (6, 2)  # until there are `EARLY` copies, and then
-EARLY = 22
+GROWTH = 1.5
+"""Of the count of events from one copy to the next."""
 MOST_S = 120
 
 
@@ -66,8 +66,7 @@ class Interrupter:
         self._events += 1
         if self._events < self._next:
             return
-        density = DENSITIES[self._copies >= EARLY]
-        self._next = self._events + 1 + self._events // density
+        self._next = max(self._events + 1, int(GROWTH * self._events))
         self._copies += 1
         command, self.command = self.command, ""
         number = SIGNALS[self._copies % len(SIGNALS)]

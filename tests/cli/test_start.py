@@ -31,6 +31,7 @@ for name, command in typer.main.get_command(app).commands.items():
     if found:
         print("imported:", name, *found)
 app(["draw", "--check-only", "courtyard"], standalone_mode=False)
+app(["train", "--scenario", "nosuch", "--run", "run"], standalone_mode=False)
 print("imported:", *(name for name in {SLOW} if name in sys.modules))
 """
 
