@@ -1,7 +1,7 @@
-"""A script that starts the commands of Dask as forks of its process, which imports all they need.
+"""A script that starts the commands of Dask as forks of its process, which has all their imports.
 
-Each line of its input are the words of a command, as JSON: `["worker", "--nthreads", "1"]`. Each line
-of its output is the number of the process.
+A line of its input is the words of a command, as JSON: `["worker", "--nthreads", "1"]`. A line of
+its output is the number of the process.
 """
 
 import json

@@ -1,12 +1,15 @@
 """A cluster gives what one process gives, whatever happens to its workers."""
 
+import json
 import logging
 import os
 import re
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
@@ -38,48 +41,75 @@ class Dask:
 
     Attributes:
         file: The scheduler file.
-        workers: One thread each, and nobody to start them again.
+        workers: The processes of the workers: one thread each, and nobody to start them again.
     """
 
     file: Path
-    workers: list[subprocess.Popen[bytes]]
+    workers: list[int]
+
+
+Starting = Callable[..., int]
+"""Starts a command of Dask with options, `scheduler` or `worker`; returns its process."""
+
+
+@pytest.fixture(scope="module")
+def start() -> Iterator[Starting]:
+    """Start processes as forks of one that has imported what they need."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.dask_forks"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as forks:
+        assert forks.stdin is not None
+        assert forks.stdout is not None
+        asked, answers = forks.stdin, forks.stdout
+
+        def started(*words: str) -> int:
+            print(json.dumps(words), file=asked, flush=True)
+            return int(answers.readline())
+
+        yield started
 
 
 @contextmanager
-def dask(folder: Path, workers: int) -> Iterator[tuple[Dask, subprocess.Popen[bytes]]]:
+def dask(start: Starting, folder: Path, workers: int) -> Iterator[tuple[Dask, int]]:
     """Start them as docs/howto/cluster.md does; give them with the scheduler's process."""
     file = folder / "scheduler.json"
     at = ("--scheduler-file", str(file))
-    scheduler = _start("scheduler", *at, "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
+    scheduler = start("scheduler", *at, "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
     one = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
-    started = [_start("worker", *at, *one) for _ in range(workers)]
+    started = [start("worker", *at, *one) for _ in range(workers)]
     try:
         with distributed.Client(scheduler_file=file, timeout=60, set_as_default=False) as client:
             if workers:
                 client.wait_for_workers(workers, timeout=60)
         yield Dask(file, started), scheduler
     finally:
-        for process in (*started, scheduler):
-            process.kill()
-            process.wait()
+        for number in (*started, scheduler):
+            end(number)
 
 
-def _start(what: str, *options: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *options]
-    return subprocess.Popen(command, stderr=subprocess.DEVNULL)
+def end(number: int) -> None:
+    """Kill a process, and wait until there is none of that number."""
+    with suppress(ProcessLookupError):
+        while True:
+            os.kill(number, signal.SIGKILL)
+            time.sleep(0.01)
 
 
 @pytest.fixture(scope="module")
-def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
+def two(start: Starting, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
     """Two workers."""
-    with dask(tmp_path_factory.mktemp("dask"), workers=2) as (started, _):
+    with dask(start, tmp_path_factory.mktemp("dask"), workers=2) as (started, _):
         yield started
 
 
 def test_all_that_the_runner_does_runs_on_the_workers(two: Dask) -> None:
     """Whatever number of processes is asked for, 1 too, and however many items there are."""
     with on_cluster(two.file):
-        assert set(run_all(process, range(40))) == {worker.pid for worker in two.workers}
+        assert set(run_all(process, range(40))) == {*two.workers}
         assert sorted(as_completed(square, range(9))) == [(i, i * i) for i in range(9)]
         assert run_all(square, range(60), workers=2) == [i * i for i in range(60)]
     assert set(run_all(process, range(2))) == {os.getpid()}
@@ -166,13 +196,12 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
     shares: list[float] = []
 
     def kill_one(share: float) -> None:
-        two.workers[0].kill()
+        end(two.workers[0])
         shares.append(share)
 
     with on_cluster(two.file) as size:
         found = evaluator.loads_of_many(PAIRS, progress=kill_one)
     assert size == (2, 2)
-    assert two.workers[0].wait() < 0
     assert [_bits(load) for load in found] == [_bits(load) for load in alone]
     assert shares == [pytest.approx((done + 1) / len(PAIRS)) for done in range(len(PAIRS))]
     assert evaluator.counts.blasts == len(PAIRS)
@@ -195,31 +224,33 @@ def test_work_that_kills_its_workers_is_given_up() -> None:
 
 
 def test_a_lost_scheduler_is_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    start: Starting,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     """And not a wait without end, nor do tracebacks of Dask come before it."""
     monkeypatch.setattr(logging.getLogger("distributed"), "propagate", True)
     lost = "the connection to the scheduler was lost"
-    with dask(tmp_path, workers=0) as (started, scheduler), on_cluster(started.file) as size:
+    with dask(start, tmp_path, workers=0) as (started, scheduler), on_cluster(started.file) as size:
         assert size == (0, 0)
-        Timer(0.2, scheduler.kill).start()
+        Timer(0.2, end, [scheduler]).start()
         with pytest.raises(BlastEnvError, match=lost):
             run_all(square, range(100))
     assert caplog.text == ""
 
 
 def test_a_scheduler_that_is_lost_before_the_work_is_the_same_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    start: Starting, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "_CONNECT_S", 3.0)
 
-    def work_without(scheduler: subprocess.Popen[bytes], file: Path) -> None:
+    def work_without(scheduler: int, file: Path) -> None:
         with on_cluster(file):
-            scheduler.kill()
-            scheduler.wait()
+            end(scheduler)
             run_all(square, range(100))
 
-    with dask(tmp_path, workers=0) as (started, scheduler):
+    with dask(start, tmp_path, workers=0) as (started, scheduler):
         levels = _levels()
         with pytest.raises(BlastEnvError, match="the connection to the scheduler was lost"):
             work_without(scheduler, started.file)
