@@ -95,8 +95,8 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     python = clean / "bin" / "python"
     # An engine that need not be compiled in every environment anew, and thin air.
     save_scenario(BALLISTIC_COURTYARD, tmp_path / "thin.toml")
-    search = ["search", "--engine", "pymunk", "--scenario", "thin.toml", "--budget", "4"]
-    search += ["--held-out", "2"]
+    search = ["search", "--engine", "pymunk", "--scenario", "thin.toml", "--budget", "1"]
+    search += ["--held-out", "1"]
     # One process for all: its imports take longer than they do.
     commands = [
         [*search, "--method", "random", "--out", "found"],

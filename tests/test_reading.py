@@ -1,7 +1,5 @@
 """Reading in a process of its own: what it gives back, and what ends it."""
 
-import os
-import signal
 import sys
 import threading
 import time
@@ -11,53 +9,28 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading, ReadingError, ReadingLimits, read_apart
+from tests.pieces_of_reading import die, double, fault, fill, refuse, spin
 
 pytestmark = pytest.mark.usefixtures("apart")
 
 
-def _double(value: int) -> int:
-    print("what a library prints is no answer")
-    return 2 * value
-
-
-def _refuse(text: str) -> None:
-    raise BlastEnvError(text)
-
-
-def _fault() -> None:
-    raise KeyError("ours")
-
-
-def _spin() -> None:
-    while True:
-        pass
-
-
-def _fill(count: int) -> int:
-    return len([bytearray(10_000_000) for _ in range(count)])
-
-
-def _die() -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def test_the_result_comes_back() -> None:
-    assert read_apart("a file", _double, 21) == 42
+    assert read_apart("a file", double, 21) == 42
 
 
 def test_errors_come_back_as_they_are() -> None:
     with pytest.raises(BlastEnvError, match=r"^a\.toml: is wrong$"):
-        read_apart("a.toml", _refuse, "a.toml: is wrong")
+        read_apart("a.toml", refuse, "a.toml: is wrong")
     with pytest.raises(KeyError, match="ours") as caught:
-        read_apart("a.toml", _fault)
-    assert "in _fault" in caught.value.__notes__[0]
+        read_apart("a.toml", fault)
+    assert "in fault" in caught.value.__notes__[0]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not limit processor time")
 def test_processor_time_is_limited() -> None:
     limits = ReadingLimits(processor_s=1)
     with pytest.raises(ReadingError, match=r"a\.dxf: takes more than 1 s of processor time"):
-        read_apart("a.dxf", _spin, limits=limits)
+        read_apart("a.dxf", spin, limits=limits)
 
 
 def test_time_on_the_clock_is_limited() -> None:
@@ -71,14 +44,14 @@ def test_time_on_the_clock_is_limited() -> None:
 def test_memory_is_limited() -> None:
     limits = ReadingLimits(memory_bytes=100_000_000)
     with pytest.raises(ReadingError, match=r"a\.osm: takes more than 100 MB of memory"):
-        read_apart("a.osm", _fill, 20, limits=limits)
-    assert read_apart("a.osm", _fill, 8, limits=limits) == 8
+        read_apart("a.osm", fill, 20, limits=limits)
+    assert read_apart("a.osm", fill, 8, limits=limits) == 8
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_process_that_is_killed_is_an_error() -> None:
     with pytest.raises(ReadingError, match=r"a\.osm: cannot be read: .* was ended"):
-        read_apart("a.osm", _die)
+        read_apart("a.osm", die)
 
 
 def test_another_thread_can_end_it() -> None:

@@ -16,6 +16,15 @@ import pytest
 
 from blast_env.app.guard import HEADERS, Entrance
 
+SERVER = """
+import sys
+from blast_env.app.jobs import Workers
+Workers.prepare = lambda _: None
+from blast_env_command import main
+main()
+"""
+"""The command, without compiled code for blasts, of which there are none."""
+
 
 @pytest.fixture
 def entrance(tmp_path: Path) -> Iterator[Entrance]:
@@ -23,7 +32,7 @@ def entrance(tmp_path: Path) -> Iterator[Entrance]:
     with closing(socket.socket()) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "blast_env", "app", "--port", str(port)]
+    command = [sys.executable, "-c", SERVER, "app", "--port", str(port)]
     # NiceGUI would take the server for one of its own tests.
     own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     with subprocess.Popen(
