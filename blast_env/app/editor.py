@@ -296,6 +296,7 @@ class Editor:
             target = Rectangle(
                 box.left + shift[0], box.bottom + shift[1], box.right + shift[0], box.top + shift[1]
             )
+        # It follows the mouse also where the site refuses it, and then says why.
         self.ghost = Ghost(target)
         try:
             if stroke.sizes:

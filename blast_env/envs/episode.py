@@ -317,6 +317,7 @@ def _outcome(
         "cache_hits": counts.cache_hits,
         "cache_hit_rate": counts.cache_hit_rate,
     }
+    # Entries depend on the engine and the objective alone: all steps have one structure.
     if evaluator.engine.medium == "particles":
         return found | {"impulse_sim": protected.impulse_sim}
     if not evaluator.engine.gives_peaks(evaluator.scenario):

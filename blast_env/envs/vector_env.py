@@ -60,6 +60,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self.num_envs = whole_number("num_envs", num_envs, 1, 1_000_000)
         self.autoreset_mode = AutoresetMode(mode)
         self.metadata = {"autoreset_mode": self.autoreset_mode}
+        # One store for all of them, with room for what each would remember by itself.
         if arguments.get("cache") is None:
             arguments["cache"] = BlastStore(size=_LOADS_EACH * self.num_envs)
         self.one = BlastBarrierEnv(**arguments)
@@ -150,6 +151,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         wanted = self.episodes.code.numbers(self._checked(actions, played))
         rewards = np.zeros(self.num_envs)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        # 1. All place, then all blasts run in one batch.
         if played:
             self.episodes.place(played, wanted[played])
             self.episodes.blast()
@@ -157,6 +159,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             terminated[played] = self.episodes.ended[played]
             ended = _indices(terminated)
             self._note(ended, [self._running[index].outcome for index in ended])
+        # 2. Ends of episodes. Those that had ended before begin anew by this step.
         self._steps[played] += 1
         truncated = self._steps >= self._most_steps
         truncated[begun] = False

@@ -530,6 +530,7 @@ class BlastRecord:
         """
         line, _, arrays = content.partition(b"\n")
         header = _HEADER.validate_json(line)
+        # The arrays follow each other without a mark: the header has their sizes.
         sizes = header.modules_n_s, header.modules_sim, header.times
         ends = [8 * end for end in accumulate(sizes)]
         on_walls, of_particles, time_s, pressure_pa = (

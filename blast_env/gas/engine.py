@@ -122,14 +122,18 @@ class GasRun:
         response_s: float = 0.0,
     ) -> None:
         self.settings, self.site, self.response_s = settings, site, response_s
+        # 1. What the run waits for, and its cost: too large a run is refused before it is laid out.
         watched = watched_structures(site, settings.until)
         self.cost = cost_of_run(settings, site, response_s)
         self.cost.check(settings)
+        # 2. The cells, and the charge as a sphere on them. Its radius leaves out the whole build
+        # zone, so that all layouts have the same source.
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
         self.remap_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
+        # 3. The recorders.
         self.table = face_table_of(self.grid, site)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
@@ -144,6 +148,7 @@ class GasRun:
             settling=Settling(settings.settled_s * scale, _HOTTEST),
             threads=settings.threads,
         )
+        # 4. The charge on the grid, and when its front has run far enough for larger cells.
         with _notice():
             set_charge(solver, self.charge, self.remap_radius_m)
             doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
@@ -151,6 +156,7 @@ class GasRun:
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
         self.end_reason: EndReason | None = None
+        # 5. When the run may end.
         self._groups = _groups(self.table, site, settings.until, watched)
         self._watches_gauges = settings.until == "gauges" and self.gauges is not None
         places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []

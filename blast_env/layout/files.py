@@ -226,6 +226,7 @@ def write_layout(
 
 def _parse(content: Any, source: str) -> LayoutFile:
     """Return the content of a file; `source` is its name, for errors."""
+    # A plain list of cells says nothing of its site.
     if not isinstance(content, dict):
         return LayoutFile(_cells(content, source, ""))
     version = content.get("version", VERSION)

@@ -324,6 +324,7 @@ class Catalogue:
             for number, item in enumerate(items)
             for turned in item.orientations
         )
+        # Measures come behind the items and cover no cell.
         variants += tuple(
             Variant(
                 number,

@@ -145,6 +145,7 @@ def named_bays(structure: AnyStructure) -> tuple[BayComponents, ...]:
     named = []
     for bay in bays:
         glazing, wall = facade.glazing, facade.wall
+        # Of several parts on a bay the last one counts, component by component.
         for part in facade.parts:
             if part.covers(bay):
                 glazing, wall = part.glazing or glazing, part.wall or wall

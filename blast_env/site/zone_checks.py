@@ -132,6 +132,7 @@ def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
             continue
         size = f"{item.length_modules} x {item.thickness_modules} modules"
         turned = "in either orientation" if len(item.orientations) > 1 else "without turning it"
+        # Too large for the zone, or only for its usable cells.
         sizes = map(item.footprint, item.orientations)
         if any(rows <= zone.rows and columns <= zone.columns for rows, columns in sizes):
             message = f"{item.name!r} of {size} fits nowhere on usable cells {turned}"

@@ -326,6 +326,7 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
     front_m = _ROAD_M + draws.length_m(ranges.stand_off_m)
     rows = 2 if draws.happens(ranges.second_probability) else 1
     most_m = (ranges.side_m - 2.0 * MARGIN_M - (rows - 1) * _BETWEEN_M) / rows
+    # Two are drawn in any case, so that later draws do not depend on the number of buildings.
     facades_m = [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
     facades_m += [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
     facades_m = facades_m[:rows]

@@ -188,6 +188,7 @@ def bay_rows(
         known: Whether the loads are known, by bay.
         validations: The validation status of each load.
     """
+    # Each bay has all columns; those of a part that it lacks stay empty.
     panes = {index: row for row, index in enumerate(found.glazed.tolist())}
     panels = {index: row for row, index in enumerate(found.walled.tolist())}
     rows = []

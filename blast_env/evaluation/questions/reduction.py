@@ -90,6 +90,7 @@ def _structure_row(
     blasts: Blasts, load_of: Callable[[BlastRecord], StructureLoad], error: GridError | None
 ) -> dict[str, object]:
     """Return the row of one structure or building, whose load in a blast is given."""
+    # The first layout is the empty site, the last one that in question.
     sides = [[load_of(part) for part in own] for own in blasts.records.values()]
     without, loads = sides[0], sides[-1]
     first, worst = loads[0], worst_validation(load.validation for load in loads)

@@ -148,6 +148,7 @@ class _System:
             system = CRS.from_user_input(text)
         plan = system.sub_crs_list[0] if system.is_compound else system.to_2d()
         crs = code_of(path, plan.to_wkt())
+        # The unit of heights: as the system says, else as asked, else a guess.
         upward = [axis for axis in system.axis_info if axis.direction in ("up", "down")]
         if upward:
             options.refuse(f"a model in {text}, which has a unit of heights", "height_unit")

@@ -342,6 +342,7 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
     name_keys = ("title", *_NAME_KEYS) if own in _OWN_STRUCTURES else _NAME_KEYS
     is_building = role is Role.BUILDING
     top_m, base_m = None, 0.0
+    # Bodies of models and drawings have heights of their own; for outlines tags are read.
     if is_building and feature.extent_m is not None:
         base_m, top_m = feature.extent_m
     elif is_building:
@@ -380,6 +381,7 @@ def _fault(feature: MapFeature, role: Role, has_layers: bool) -> str:
     if feature.fault:
         return feature.fault
     is_below = _word(tags, "location") in _BELOW
+    # In OpenStreetMap `layer` says what is above what; in drawings it is a name.
     if not has_layers and _own_kind(tags, has_layers) not in _KINDS:
         is_below = is_below or _word(tags, "layer").startswith("-")
     is_point = feature.geometry.geom_type in ("Point", "MultiPoint")

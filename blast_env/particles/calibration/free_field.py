@@ -128,6 +128,7 @@ class FreeFieldStudy:
         Raises:
             BlastEnvError: If the store is damaged or cannot be written.
         """
+        # The key has all that a run depends on, so that no other one is taken for it.
         wanted = {
             f"{scenario.content_hash} {seed} {self.engine} {VERSIONS[self.engine]}": (
                 scenario,
