@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -50,11 +49,9 @@ _SINGLE_STEPS: Final = 400
 
 def _guesses() -> Any:
     """Return the engine of guesses: entry points are those of the installed checkout alone."""
-    try:
-        place = import_module("blast_env.surrogate.engine")
-    except ModuleNotFoundError:  # until November 2026
-        place = import_module("blast_env.design.surrogate.engine")
-    return place.SurrogateEngine()
+    from blast_env.surrogate.engine import SurrogateEngine
+
+    return SurrogateEngine()
 
 
 _SITES: Final = 16
