@@ -49,7 +49,7 @@ def test_the_command_writes_what_minari_reads(
         assert bool(episode.terminations[-1])
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", [*IDS, "BlastBarrier-MO-v0"])
 def test_it_records_episodes_of_every_id(name: str, tmp_path: Path, monkeypatch: Any) -> None:
     minari = pytest.importorskip("minari", reason=WHY)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))

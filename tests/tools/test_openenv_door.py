@@ -1,8 +1,11 @@
 """The door by OpenEnv: the environment itself, and a server with the package's own client."""
 
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -82,6 +85,9 @@ def test_a_server_needs_its_address_and_keeps_clients_apart() -> None:
         with pytest.raises(urllib.error.HTTPError, match="403"):
             answered(f"http://127.0.0.1:{port}/schema")
         assert b"ToolCall" in answered(f"{address}/schema")
+        validate = [str(Path(sys.executable).with_name("openenv")), "validate", "--url", address]
+        report = subprocess.run(validate, capture_output=True, text=True, check=False).stdout
+        assert "Verdict: PASS" in report, report
         by_clients(address)
 
 
