@@ -128,10 +128,12 @@ class _Model:
                 "StopsVehicles": placed.variant.stops_vehicles,
                 "AsHighAsTheAir": block.height_m is None,
             }
+            body = scenario.build_zone.rigid_piece(placed.element)
+            if body is not None:
+                length_m = MODULE_SIDE_M * (1 if item is None else item.length_modules)
+                properties["MassKg"] = body.mass_kg_m * length_m
+                properties["MassIsStated"] = item is not None and item.mass_kg is not None
             if item is not None:
-                length_m = MODULE_SIDE_M * item.length_modules
-                properties["MassKg"] = item.rigid_piece.mass_kg_m * length_m
-                properties["MassIsStated"] = item.mass_kg is not None
                 properties["Description"] = item.description
             rating = placed.variant.crash_rating
             if rating is not None:

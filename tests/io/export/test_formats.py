@@ -153,6 +153,19 @@ def test_barriers_in_ifc_have_mass_rating_and_cost(tmp_path: Path) -> None:
     assert same[0] == same[1]
 
 
+def test_modules_in_ifc_are_blocks_of_concrete(tmp_path: Path) -> None:
+    ifcopenshell = pytest.importorskip("ifcopenshell")
+    from ifcopenshell.util.element import get_psets
+
+    path = export_layout(LayoutPlan(hut(), MODULES), tmp_path / "modules.ifc")
+    model = ifcopenshell.open(str(path))
+    blocks = model.by_type("IfcBuildingElementProxy")
+    assert len(blocks) == len(MODULES)
+    own = get_psets(blocks[0])["BlastEnv_Barrier"]
+    assert own["MassKg"] == pytest.approx(2400.0 * 0.5 * 0.5 * 1.5)
+    assert own["MassIsStated"] is False
+
+
 # Blasts.
 
 
