@@ -17,7 +17,7 @@ from itertools import groupby
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-GROWTH = 1.5
+GROWTH = 1.22
 """Of the count of events from one copy to the next."""
 MOST_S = 120
 

@@ -15,7 +15,7 @@ import pytest
 LINE = "interrupted: no file was left half-written\n"
 STARTS = str(Path(__file__).with_name("starts.py"))
 COPIES = str(Path(__file__).with_name("copies.py"))
-LEAST_COPIES = 10
+LEAST_COPIES = 20
 
 Ending = Callable[[str], tuple[int, str, str]]
 
