@@ -1,5 +1,6 @@
 """`blast-env simulate`: run one blast; print its loads and write its files."""
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -150,17 +151,13 @@ def simulate(
     blasts = [replace(blast, layout=()), blast] if side_by_side else [blast]
     with progress_bar(f"blast in {site.name}") as progress:
         results = files.run(blasts, progress)
-    result, written = results[-1], [] if film is None else [film]
-    if excel is not None:
-        written.append(result.to_excel(excel))
-    written += files.draw(results)
-    if export is not None:
-        written += export_blast(result, export)
+    written = [] if film is None else [film]
+    written += _written(files, results, excel, export)
     if as_json:
-        print_record(blast_record(result), written)
+        print_record(blast_record(results[-1]), written)
         return
     print_line(used.describe([site]))
-    print_outcome(blast_answer(result), written)
+    print_outcome(blast_answer(results[-1]), written)
 
 
 def _site_and_layout(
@@ -184,6 +181,17 @@ def _files(context: typer.Context, export: Path | None, times: int | None) -> Bl
         return files
     check_blast_target(export)  # before the blast, so that it is not lost
     return replace(files, further=blast_recorders(export, times))
+
+
+def _written(
+    files: BlastFiles, results: Sequence[Any], excel: Path | None, export: Path | None
+) -> list[Path]:
+    """Write the files that are made after the blasts, of the last one or of all."""
+    written = [] if excel is None else [results[-1].to_excel(excel)]
+    written += files.draw(results)
+    if export is not None:
+        written += export_blast(results[-1], export)
+    return written
 
 
 def _refuse_of_other_engines(context: typer.Context, engine: Engine) -> None:

@@ -23,6 +23,7 @@ from blast_env.layout import LayoutState
 from blast_env.layout.build_site import vehicle_reach
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.site.catalogue import Catalogue
 from blast_env.surrogate.walls import WallPoints
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.reach import squares_of
@@ -191,16 +192,11 @@ class Candidates:
         variants = catalogue.variants
         rows, columns = (np.array(size)[number] for size in zip(*catalogue.sizes, strict=True))
         boxes_m = _boxes_m(zone.rectangle_m, row, column, rows, columns)
-        air_m = scenario.air_height_m
-        heights = [air_m if variant.height_m is None else variant.height_m for variant in variants]
-        height_m = np.array(heights)[number]
+        height_m = _heights_m(catalogue, scenario.air_height_m)[number]
         is_measure = rows == 0
         cost = empty.costs[number, row, column]
         numbers = np.flatnonzero(empty.legal.ravel())
-        is_post, is_wall = (
-            np.isin(numbers, [catalogue.action(element) for element in layout])
-            for layout in (posts, walled)
-        )
+        is_post, is_wall = (_is_in(numbers, layout, catalogue) for layout in (posts, walled))
         # 2. What each hides, from each place of the charge.
         views = [_view(one, walls, boxes_m, height_m, is_measure) for one in charges]
         # 3. The features: as seen on average, its own, and those of the site.
@@ -250,6 +246,17 @@ def _protected_walls(scenario: Scenario) -> WallPoints:
     if not protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
     return WallPoints.on(protected, scenario.air_height_m)
+
+
+def _is_in(numbers: IntArray, layout: Layout, catalogue: Catalogue) -> BoolArray:
+    """Return whether candidates are elements of a layout (candidates,)."""
+    return np.isin(numbers, [catalogue.action(element) for element in layout])
+
+
+def _heights_m(catalogue: Catalogue, air_m: float) -> FloatArray:
+    """Return the height of each variant, that of the air where it is unlimited (variants,)."""
+    own = [variant.height_m for variant in catalogue.variants]
+    return np.array([air_m if height_m is None else height_m for height_m in own])
 
 
 def _boxes_m(
