@@ -29,8 +29,7 @@ from blast_env.design.search import (
     random_walls,
     repaired,
 )
-from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.site import Charge, Scenario

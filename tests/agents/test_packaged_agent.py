@@ -17,8 +17,7 @@ from blast_env.design.proposal import problem_of
 from blast_env.design.search import Guesses, layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, LoadCaseSet
-from blast_env.layout import LayoutState, load_layout
-from blast_env.layout.build_site import draw_threat
+from blast_env.layout import LayoutState, draw_threat, load_layout
 from blast_env.site import AnyCharge, Charge, Scenario
 from blast_env.sites import ItemSiteRanges, generate_site, kerb_site, turned
 from blast_env.surrogate import packaged_surrogate

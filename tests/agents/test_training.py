@@ -21,7 +21,7 @@ from stable_baselines3.common.monitor import load_results
 
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation import BlastStore
 from blast_env.site import load_scenario, save_scenario
 from tests.agents.training_runs import (
     ROLLOUT,

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from blast_env.surrogate import packaged_surrogate
-from blast_env.surrogate.fitting import Samples
+from blast_env.surrogate import Samples, packaged_surrogate
 from studies.data_baselines import MODELS, bare_log_impulse, pooled, recorded, scores
 from studies.surrogate import named_rows, samples_of
 
