@@ -14,6 +14,15 @@ from blast_env.tools.session import Session
 from blast_env.tools.table import TOOLS, call_tool
 from blast_env.tools.tasks import Episode, Tasks
 
+NAME: Final = "blast-env"
+"""Name of the environment for its clients."""
+
+ABOUT: Final = "Barriers against blasts: tools, a budget of blasts, and one score at the end."
+"""What the environment is, for its clients."""
+
+MOST_EPISODES: Final = 64
+"""Most episodes at the same time."""
+
 _MOST_LISTED: Final = 100
 """Most problems of a list of a whole split."""
 

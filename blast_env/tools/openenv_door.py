@@ -1,20 +1,19 @@
 """The door by OpenEnv: an episode of the tools as an environment, by HTTP and websockets."""
 
-from typing import Any, Final
+from typing import Any
 
 from pydantic import Field
 
 from blast_env.errors import import_extra
-from blast_env.tools.episodes import Episodes, TaskLists
+from blast_env.provenance import package_version
+from blast_env.tools.episodes import ABOUT, MOST_EPISODES, NAME, Episodes, TaskLists
 from blast_env.tools.table import TOOLS
 from blast_env.tools.tasks import Tasks
 
 with import_extra("openenv", "tools by OpenEnv"):
     from fastapi import FastAPI
     from openenv.core.env_server import Action, Environment, Observation, State, create_app
-
-MOST_EPISODES: Final = 64
-"""Most episodes at the same time."""
+    from openenv.core.env_server.types import EnvironmentMetadata
 
 
 class ToolCall(Action):
@@ -53,8 +52,11 @@ class ToolEnvironment(TaskLists, Environment[ToolCall, ToolAnswer, State]):
 
     def step(self, action: ToolCall, timeout_s: float | None = None, **_: Any) -> ToolAnswer:  # noqa: ARG002
         """Call a tool."""
-        turn = self._episodes.step(action.tool, action.arguments)
-        return ToolAnswer(**turn.model_dump())
+        return ToolAnswer(**self._episodes.step(action.tool, action.arguments).model_dump())
+
+    def get_metadata(self) -> EnvironmentMetadata:
+        """Return the name of the package and its version."""
+        return EnvironmentMetadata(name=NAME, description=ABOUT, version=package_version())
 
     @property
     def state(self) -> State:
@@ -72,7 +74,7 @@ def openenv_app(tasks: Tasks) -> FastAPI:
         lambda: ToolEnvironment(tasks),
         ToolCall,
         ToolAnswer,
-        env_name="blast-env",
+        env_name=NAME,
         max_concurrent_envs=MOST_EPISODES,
     )
     return app

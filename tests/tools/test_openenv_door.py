@@ -14,6 +14,7 @@ openenv = pytest.importorskip("openenv", reason="needs the extra openenv: `make 
 
 from openenv import GenericEnvClient  # noqa: E402
 
+from blast_env.provenance import package_version  # noqa: E402
 from blast_env.tools import TOOLS, Tasks  # noqa: E402
 from blast_env.tools.openenv_door import ToolCall, ToolEnvironment  # noqa: E402
 from blast_env.tools.scripts import played, played_in, rules_guesses_blasts  # noqa: E402
@@ -85,6 +86,7 @@ def test_a_server_needs_its_address_and_keeps_clients_apart() -> None:
         with pytest.raises(urllib.error.HTTPError, match="403"):
             answered(f"http://127.0.0.1:{port}/schema")
         assert b"ToolCall" in answered(f"{address}/schema")
+        assert package_version() in answered(f"{address}/metadata").decode()
         validate = [str(Path(sys.executable).with_name("openenv")), "validate", "--url", address]
         report = subprocess.run(validate, capture_output=True, text=True, check=False).stdout
         assert "Verdict: PASS" in report, report
