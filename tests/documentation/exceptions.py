@@ -180,6 +180,12 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.surrogate fit --out surrogate.json": (
         "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
     ),
+    "python -m studies.surrogate fit --begin-with surrogate.json --more"
+    " docs/data/module_site_blasts.parquet --epochs 6 --out more.json": (
+        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
+    ),
+    "python -m studies.surrogate judge courtyard street_junction --charges 3"
+    " --surrogate more.json": "--charges 1 --changes 1",
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites"
     " --kind street_sites --sites 24 --surrogate surrogate.json": (
