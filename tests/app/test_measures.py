@@ -11,7 +11,7 @@ from nicegui.testing import User
 from blast_env.answers import Number
 from blast_env.answers.compare import verdict_table
 from blast_env.answers.document import AnyCell
-from blast_env.app import edits, placing, session
+from blast_env.app import blasts, edits, placing, session
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions
@@ -57,12 +57,14 @@ def number_of(cell: AnyCell) -> float:
 
 @pytest.fixture(scope="module")
 def blasted(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    """The hut behind a wall, blasted by gas."""
+    """The hut behind a wall, blasted by gas, without pictures."""
     folder = WorkFolder(tmp_path_factory.mktemp("measures"))
     session = Sessions(folder, Here()).new(hardened_hut(), "begin")
     session.cells = 0.5
     session.put("wall", session.design.with_layout(WALL))
-    session.blast([0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blasts, "_pictures", lambda *_: ())
+        session.blast([0])
     return session
 
 

@@ -1,7 +1,5 @@
 """`blast-env judge --run`, the score of a trained agent, run in this process."""
 
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,26 +8,27 @@ from blast_agents.training import train
 from blast_agents.training.agent import PolicyAgent
 
 from blast_env.benchmark import SubmissionJudgement, site_problems
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation import BlastLoads
+from blast_env.evaluation.engines import Engine
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
 from blast_env.site import AnyCharge, AnyScenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
-from tests.blasts import soon_growing_cells
 from tests.cli.running import run
+from tests.evaluation.engines.shade import ShadeEngine
 
 
 @pytest.fixture(autouse=True)
-def _quick_blasts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Run all blasts of gas on cells that grow soon: no load is compared with others."""
-    start = GasBlast.start
+def _loads_by_a_formula(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take the loads of gas from a formula: what is done with them is looked at."""
+    shade = ShadeEngine()
 
-    def quick(self: GasBlast, *arguments: Any) -> Any:
-        return start(replace(self, engine=GasEngine(cells="coarse")), *arguments)
+    def loads(_: GasEngine, *blast: Any) -> BlastLoads:
+        return shade.loads(*blast)
 
-    monkeypatch.setattr(GasBlast, "start", quick)
-    with soon_growing_cells():
-        yield
+    monkeypatch.setattr(GasEngine, "loads", loads)
+    monkeypatch.setattr(GasEngine, "record", Engine.record)
 
 
 def judged_agent(folder: Path, site: Path, *given: Any, **changes: Any) -> SubmissionJudgement:
