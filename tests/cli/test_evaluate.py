@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from blast_env import load_scenario, save_scenario
+from blast_env import save_scenario
 from blast_env.evaluation import evaluate_layout
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutFile, write_layout
@@ -16,27 +16,33 @@ from blast_env.particles.event import EventRun
 from blast_env.site import PointSource
 from tests.cli.running import run
 from tests.envs.small import small_scenario
+from tests.evaluation.cases import WALL
+from tests.scenarios import BALLISTIC_COURTYARD
 
-CELLS = [(9, 0), (10, 0), (11, 0)]
+CELLS = WALL  # in the way of most threats: in sparse air, few modules hardly show
+
+Given = tuple[str | Path, ...]
 
 
 @pytest.fixture
-def layout(tmp_path: Path) -> Path:
-    path = tmp_path / "layout.json"
-    path.write_text(json.dumps(CELLS))
-    return path
+def given(tmp_path: Path) -> Given:
+    """Name a layout, and the courtyard in sparse air, where a blast takes a tenth of the time."""
+    layout, site = tmp_path / "layout.json", tmp_path / "sparse.toml"
+    layout.write_text(json.dumps(CELLS))
+    save_scenario(BALLISTIC_COURTYARD, site)
+    return ("--layout", layout, "--scenario", site)
 
 
 evaluate = partial(run, "evaluate", "--engine", "event")
 """With blasts of milliseconds, unless the arguments name another engine."""
 
 
-def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: Path) -> None:
+def test_it_prints_the_evaluation_and_writes_all_files(given: Given, tmp_path: Path) -> None:
     out = tmp_path / "a" / "b"
     options = ("--seeds", "3", "--first-seed", "7", "--processes", "2", "--out", out)
-    result = evaluate("--layout", layout, *options)
+    result = evaluate(*given, *options)
     assert result.exit_code == 0, result.output
-    expected = evaluate_layout(load_scenario("courtyard"), CELLS, (7, 8, 9), engine="event")
+    expected = evaluate_layout(BALLISTIC_COURTYARD, CELLS, (7, 8, 9), engine="event")
     content = json.loads((out / "evaluation.json").read_text())
     assert {name: content[name] for name in expected.to_dict()} == expected.to_dict()
     half = 100.0 * (expected.mean_reduction - expected.ci95[0])
@@ -54,52 +60,52 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     assert (out / "evaluation.png").stat().st_size > 1000
 
 
-def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -> None:
-    result = evaluate("--layout", layout, "--seeds", "1", "--json")
+def test_it_prints_json_and_says_when_one_threat_has_no_interval(given: Given) -> None:
+    result = evaluate(*given, "--seeds", "1", "--json")
     assert result.exit_code == 0, result.output
     content = json.loads(result.stdout)
     assert content["layout"] == [list(cell) for cell in CELLS]
     assert content["result"]["reduction"]["ci95_low"] is None
     assert content["files"] == []
     assert content["cache"] == {"blasts": 2, "hits": 0, "hit_rate": 0.0}
-    table = evaluate("--layout", layout, "--seeds", "1")
+    table = evaluate(*given, "--seeds", "1")
     share = 100.0 * content["result"]["reduction"]["value"]
     assert f"mean reduction {share:.1f} %\n" in table.stdout
     assert "(cells)" not in table.stdout
 
 
 def test_a_layout_file_may_go_while_blasts_run(
-    layout: Path, monkeypatch: pytest.MonkeyPatch
+    given: Given, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All of it is read before the first blast, so that no result is lost."""
-    advance = EventRun.advance
+    advance, layout = EventRun.advance, tmp_path / "layout.json"
 
     def gone(run: EventRun, until_s: float) -> None:
         layout.unlink(missing_ok=True)
         advance(run, until_s)
 
     monkeypatch.setattr(EventRun, "advance", gone)
-    result = evaluate("--layout", layout, "--seeds", "1")
+    result = evaluate(*given, "--seeds", "1")
     assert result.exit_code == 0, result.output
     assert not layout.exists()
 
 
 def test_the_next_run_finds_the_blasts_that_the_first_one_kept(
-    layout: Path, tmp_path: Path
+    given: Given, tmp_path: Path
 ) -> None:
     options = ("--engine", "event", "--cache", tmp_path / "blasts")
-    first = evaluate("--layout", layout, "--seeds", "2", *options)
+    first = evaluate(*given, "--seeds", "2", *options)
     assert first.exit_code == 0, first.output
     assert "4 blasts run, 0 known already (cache hit rate 0.0 %)" in first.stdout
-    second = evaluate("--layout", layout, "--seeds", "3", "--json", *options)
+    second = evaluate(*given, "--seeds", "3", "--json", *options)
     content = json.loads(second.stdout)
     assert content["cache"] == {"blasts": 2, "hits": 4, "hit_rate": pytest.approx(2 / 3)}
-    fresh = evaluate("--layout", layout, "--seeds", "3", "--json", "--engine", "event")
+    fresh = evaluate(*given, "--seeds", "3", "--json", "--engine", "event")
     assert json.loads(fresh.stdout)["result"] == content["result"]
 
 
 def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
-    layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    given: Given, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     advance, runs = EventRun.advance, [0]
 
@@ -109,7 +115,7 @@ def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
             signal.raise_signal(signal.SIGTERM)
         advance(self, until_s)
 
-    options = ("--layout", layout, "--seeds", "2", "--out", tmp_path / "out")
+    options = (*given, "--seeds", "2", "--out", tmp_path / "out")
     cache = tmp_path / "cache"
     monkeypatch.setattr(EventRun, "advance", terminated)
     result = evaluate(*options, "--cache", cache)

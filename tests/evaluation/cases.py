@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blast_env import Charge, load_scenario
+from blast_env import Charge
 from blast_env.evaluation import (
     BlastEvaluator,
     BlastLoads,
@@ -17,8 +17,9 @@ from blast_env.evaluation import (
 )
 from blast_env.geometry import Element
 from blast_env.site import Scenario
+from tests.scenarios import BALLISTIC_COURTYARD
 
-COURTYARD = load_scenario("courtyard")
+COURTYARD = BALLISTIC_COURTYARD
 SEEDS = (0, 1, 2, 3)
 THREATS = draw_threats(COURTYARD, SEEDS)
 

@@ -97,8 +97,8 @@ def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> Non
     of_model, note = evaluation.notes
     assert of_model == PARTICLES_OVERRATE
     assert note == (
-        "building: 2 of 3 threats are outside the range of calibration 'collisional_kb', "
-        "e.g. charge 15 kg TNT is not between 20 and 1000 kg"
+        "building: 2 of 3 threats are outside the range of calibration 'ballistic_kb_100kg', "
+        "e.g. charge 15 kg TNT is not 100 kg"
     )
 
 
@@ -128,7 +128,7 @@ def test_a_file_has_versions_units_and_no_numbers_that_json_does_not_know(
     assert content["result"]["reduction"]["ci95_low"] is None
     assert content["modules"][12]["reduction"] is None
     assert content["versions"]["engine"].startswith("event 1 (numba ")
-    assert content["calibration"] == "collisional_kb"
+    assert content["calibration"] == "ballistic_kb_100kg"
     assert content["result"]["cvar"] == content["threats"][0]["load"]
 
 

@@ -8,7 +8,7 @@ import joblib
 import numpy as np
 import pytest
 
-from blast_env import Charge, simulate
+from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import CalibrationError
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, StructureLoad
@@ -38,7 +38,8 @@ def test_loads_are_those_of_simulate(scenario: Scenario, engine: str) -> None:
     assert loads.module_impulse_sim.tolist() == modules.impulse_sim.tolist()
 
 
-def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluator) -> None:
+def test_notes_say_what_the_calibration_was_not_made_for() -> None:
+    evaluator = BlastEvaluator(load_scenario("courtyard"), "event")
     light = evaluator.loads((), LoadCase(Charge((10.0, 15.0), 15.0), 0))
     assert not light.in_range
     assert light.structures[0].notes == ("charge 15 kg TNT is not between 20 and 1000 kg",)

@@ -22,6 +22,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import load_scenario
 from blast_env.statistics import Estimate, reductions
 from tests.gas_sites import WALL, hut, site_document
+from tests.scenarios import BALLISTIC_COURTYARD
 
 NUMBERS = st.floats(-1e6, 1e6)
 
@@ -133,7 +134,7 @@ def test_final_statements_have_it_beside_each_number() -> None:
 
 @pytest.mark.parametrize("engine", ["event", GasEngine(border_m=0.0)])
 def test_particles_and_the_largest_cells_have_none(engine: str | GasEngine) -> None:
-    site = load_scenario("courtyard") if engine == "event" else hut()
+    site = BALLISTIC_COURTYARD if engine == "event" else hut()
     evaluation = evaluate_layout(site, (), [0], engine=engine)
     assert evaluation.to_dict()["result"]["grid_error"] is None
     assert evaluation.table["reduction_error"].isna().all()

@@ -11,6 +11,7 @@ from blast_env.geometry import Layout
 from blast_env.site import Charge
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
+from tests.scenarios import BALLISTIC_COURTYARD
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_an_evaluation_has_the_worst_validation_of_its_threats() -> None:
     assert found.table["validation"].tolist() == ["outside"]
     assert found.table["reason"].str.startswith("scaled distance 0.54 m/kg^(1/3)").all()
     assert found.to_dict()["structures"][0]["validation"] == "outside"
-    by_particles = evaluate_layout("courtyard", (), range(1), engine="event")
+    by_particles = evaluate_layout(BALLISTIC_COURTYARD, (), range(1), engine="event")
     assert set(by_particles.table["validation"]) <= {"approximate", "outside"}
 
 
