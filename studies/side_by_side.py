@@ -257,12 +257,11 @@ def _side(checkout: Path, name: str) -> Iterator[Callable[[], float]]:
             raise SideError(f"{checkout}: row {name!r}: {''.join(last) or 'no answer'}") from None
         return float(spent_s) / float(count)
 
-    try:
-        with process:
+    with process:
+        try:
             yield measured
-            stdin.close()
-    finally:
-        process.kill()
+        finally:
+            process.kill()  # also where the other side has failed and this one still prepares
 
 
 def _answer(name: str) -> None:

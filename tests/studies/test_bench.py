@@ -84,21 +84,51 @@ def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
 # --- Two checkouts side by side.
 
 
-def test_a_checkout_costs_what_it_costs_itself() -> None:
-    """Each side measures in a process of its own, here of the same checkout."""
-    root = Path(bench.__file__).resolve().parents[1]
-    (found,) = compare(root, root, ["one"], turns=1)
-    assert found.row is ROWS["one"]
-    assert 0.25 < found.ratio == found.ratios[0] < 4.0
+CHECKOUT = """
+class Blast:
+    def loads(self):
+        return sum(number * number for number in range({work}))
+
+def simulate(scenario, engine, cells):
+    assert (scenario, engine, cells) == ("control_room", "gas", "uniform")
+    return Blast()
+"""
+"""A package whose blasts only count."""
+
+
+def checkout(folder: Path, content: str) -> Path:
+    (folder / "blast_env").mkdir(parents=True)
+    (folder / "blast_env" / "__init__.py").write_text(content)
+    return folder
+
+
+def test_a_checkout_costs_what_it_costs_itself(tmp_path: Path) -> None:
+    """Each side measures its own package in a process of its own; eight times the work costs more."""
+    older, newer = (
+        checkout(tmp_path / name, CHECKOUT.format(work=work))
+        for name, work in (("older", 1_600_000), ("newer", 200_000))
+    )
+    (found,) = compare(older, newer, ["gas-control_room"], turns=2)
+    assert found.row is ROWS["gas-control_room"]
+    assert len(found.ratios) == 2
+    assert 2.0 < found.ratio < 32.0
+
+
+@pytest.mark.parametrize("name", ["one", "batch"])
+def test_environments_are_timed_by_the_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for steps in ("_SINGLE_STEPS", "_STEPS"):
+        monkeypatch.setattr(f"studies.side_by_side.{steps}", 8)
+    monkeypatch.setattr("studies.side_by_side._ENVIRONMENTS", 2)
+    spent_s, steps = ROWS[name].prepare()()
+    assert spent_s > 0.0
+    assert 8 <= steps <= 16
 
 
 def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
     assert "must be the folder of a checkout" in run("--against", str(tmp_path)).output
     assert "needs --against" in run("--row", "one").output
     assert "did you mean 'one'" in run("--against", str(tmp_path), "--row", "onne").output
-    package = tmp_path / "blast_env"
-    package.mkdir()
-    (package / "__init__.py").write_text("raise RuntimeError('an older one')")
+    checkout(tmp_path, "raise RuntimeError('an older one')")
     failed = run("--against", str(tmp_path), "--row", "one")
     assert failed.exit_code != 0
     assert "row 'one': RuntimeError: an older one" in " ".join(failed.output.split())
