@@ -103,7 +103,7 @@ def checkout(folder: Path, content: str) -> Path:
 
 
 def test_a_checkout_costs_what_it_costs_itself(tmp_path: Path) -> None:
-    """Each side measures its own package in a process of its own; eight times the work costs more."""
+    """Each side measures its own package in a process of its own."""
     older, newer = (
         checkout(tmp_path / name, CHECKOUT.format(work=work))
         for name, work in (("older", 1_600_000), ("newer", 200_000))
