@@ -22,7 +22,7 @@ from stable_baselines3.common.monitor import load_results
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastStore
-from blast_env.site import load_scenario, save_scenario
+from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.agents.training_runs import (
     ROLLOUT,
     STEPS,
@@ -31,6 +31,7 @@ from tests.agents.training_runs import (
     settings,
     small_scenario,
 )
+from tests.builders import point
 from tests.catalogue_sites import wide_yard
 
 FILES = {
@@ -140,10 +141,12 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_another(
 ) -> None:
     """Weights, episodes and evaluations, to the last bit."""
     scenario = scenario_file(tmp_path)
-    for seed in (0, 1):
-        train(settings(scenario, seed=seed), hyperparameters(), tmp_path / f"run{seed}")
+    for seed, steps in ((0, STEPS), (1, ROLLOUT)):
+        chosen = settings(scenario, seed=seed, steps=steps)
+        train(chosen, hyperparameters(), tmp_path / f"run{seed}")
     assert outcome(tmp_path / "run0") == outcome(finished)
-    assert outcome(tmp_path / "run1")[1] != outcome(finished)[1]
+    other = outcome(tmp_path / "run1")[1]
+    assert other != outcome(finished)[1][: len(other)]
 
 
 def test_an_interrupted_run_goes_on_from_its_last_checkpoint(
@@ -186,8 +189,8 @@ def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Pa
 def test_blasts_without_noise_are_kept_for_a_continued_run(tmp_path: Path) -> None:
     scenario = tmp_path / "yard.toml"
     save_scenario(wide_yard(), scenario)
-    chosen = settings(scenario, engine="gas", steps=16)
-    small = hyperparameters({"n_epochs": 1})
+    chosen = settings(scenario, engine="gas", steps=4)
+    small = hyperparameters({"n_steps": 4, "batch_size": 4, "n_epochs": 1})
     train(chosen, small, tmp_path / "run")
     assert len(BlastStore(tmp_path / "run" / "blasts")) > 0
 
@@ -246,10 +249,17 @@ def test_other_algorithms_and_hidden_threats_train_too(
 
 
 def test_training_learns(tmp_path: Path) -> None:
-    """On a site where only cells in the line of sight help, within some 250 blasts."""
-    changes = {"n_steps": 128, "batch_size": 64, "n_epochs": 4, "learning_rate": 0.01}
+    """On a site where only cells in the line of sight help, within some 100 blasts.
+
+    Of ten seeds the least gain is 0.17.
+    """
+    document = small_scenario(stock=2).model_dump()
+    document["charge"] = [point(2.0, 7.0, 100.0)]
+    document["build_zone"]["columns"] = 1
+    save_scenario(Scenario.from_document(document, "column"), tmp_path / "column.toml")
+    changes = {"n_steps": 64, "batch_size": 64, "n_epochs": 4, "learning_rate": 0.02}
     chosen = hyperparameters({**changes, "policy_kwargs.width": 16})
-    run = settings(scenario_file(tmp_path), steps=128 * 6, evaluation_interval=6)
+    run = settings(tmp_path / "column.toml", steps=64 * 3, evaluation_interval=3)
     train(run, chosen, tmp_path / "run")
     reduction = load_results(str(tmp_path / "run"))["reduction"]
     assert reduction[-32:].mean() > reduction[:32].mean() + 0.1

@@ -15,6 +15,7 @@ from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from tests.agents.sites import site
+from tests.evaluation.engines.rays import RaysEngine
 
 CALIBRATION = "ballistic_kb_100kg"
 
@@ -44,7 +45,7 @@ def small_problem(
     evaluator: BlastEvaluator | None = None, realisations: int = 2, processes: int = 1
 ) -> DesignProblem:
     """Return the problem of the small site's own charge: 299 layouts, 598 blasts."""
-    evaluator = evaluator or BlastEvaluator(small_scenario(), "event", cache=known_blasts())
+    evaluator = evaluator or BlastEvaluator(small_scenario(), RaysEngine(), cache=known_blasts())
     charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
     seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
     threats = tuple(LoadCase(charge, seed) for seed in seeds.tolist())
@@ -71,7 +72,7 @@ class WatchedEvaluator(BlastEvaluator):
     def __init__(
         self, scenario: Scenario, watch: Callable[[list[tuple[Layout, LoadCase]]], None]
     ) -> None:
-        super().__init__(scenario, "event", cache=known_blasts())
+        super().__init__(scenario, RaysEngine(), cache=known_blasts())
         self._watch = watch
 
     def loads_of_many(

@@ -33,6 +33,7 @@ from tests.design.search_cases import (
     small_problem,
     small_scenario,
 )
+from tests.evaluation.engines.rays import RaysEngine
 from tests.evaluation.engines.shade import ShadeEngine
 
 ALL_BLASTS = 598
@@ -62,12 +63,12 @@ def gap(problem: DesignProblem, result: SearchResult, optimum: Layout) -> float:
 @pytest.mark.parametrize(
     ("name", "budget", "most"),
     [
-        ("random", ALL_BLASTS // 10, 0.02),
-        ("population_annealing", ALL_BLASTS // 10, 0.02),
-        ("genetic", ALL_BLASTS // 10, 0.025),
-        ("nsga2", ALL_BLASTS // 10, 0.035),  # also looks for layouts with fewer modules
-        ("wall_near_charge", 0, 0.04),
-        ("wall_near_building", 0, 0.045),
+        ("random", ALL_BLASTS // 10, 0.01),
+        ("population_annealing", ALL_BLASTS // 10, 0.005),
+        ("genetic", ALL_BLASTS // 10, 0.005),
+        ("nsga2", ALL_BLASTS // 10, 0.01),  # also looks for layouts with fewer modules
+        ("wall_near_charge", 0, 0.01),
+        ("wall_near_building", 0, 0.04),
     ],
 )
 def test_gaps_to_the_optimum(
@@ -94,7 +95,7 @@ def test_the_seed_decides_everything(name: str, problem: DesignProblem) -> None:
 
 
 def test_the_number_of_processes_changes_nothing(problem: DesignProblem) -> None:
-    fresh = small_problem(BlastEvaluator(small_scenario(), "event"), processes=2)
+    fresh = small_problem(BlastEvaluator(small_scenario(), RaysEngine()), processes=2)
     assert GeneticSearch().propose(fresh, 24, 1) == GeneticSearch().propose(problem, 24, 1)
 
 
@@ -164,10 +165,10 @@ def test_layouts_are_legal_on_real_sites(method: str) -> None:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_it_ends_when_there_is_nothing_new_left(name: str) -> None:
-    """Two cells and one module make three layouts, whatever the budget."""
-    evaluator = BlastEvaluator(small_scenario(rows=2, columns=1, stock=1), "event")
+    """Two cells and one module make three layouts, however large the budget."""
+    evaluator = BlastEvaluator(small_scenario(rows=2, columns=1, stock=1), RaysEngine())
     problem = small_problem(evaluator)
-    result = find_proposer(name).propose(problem, 1000, 0)
+    result = find_proposer(name).propose(problem, 100, 0)
     assert result.blasts <= 6
     assert result.layout in (((0, 0),), ((1, 0),))
 
@@ -181,7 +182,7 @@ def test_it_can_begin_with_given_layouts(name: str, optimum: Layout) -> None:
     result = method.propose(watched, 40, 0)
     assert method.name == result.method == name
     assert optimum in {layout for layout, _ in asked[0]}
-    assert gap(watched, result, optimum) <= 0.03
+    assert gap(watched, result, optimum) <= 0.01
 
 
 def test_what_is_no_method_or_begins_with_no_layouts_is_told() -> None:
@@ -210,7 +211,7 @@ def test_the_front_is_near_the_true_one(problem: DesignProblem, optimum: Layout)
         true_pa_s = min(
             problem.load(layout) for layout in layouts if len(layout) <= len(candidate.layout)
         )
-        assert (problem.load(candidate.layout) - true_pa_s) / bare_pa_s <= 0.03
+        assert (problem.load(candidate.layout) - true_pa_s) / bare_pa_s <= 0.01
     assert result.layout == result.front[-1].layout
     assert len(result.front_table()) == 4
 
@@ -272,13 +273,13 @@ def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: Des
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     """At equal cost: what makes it a baseline worth beating."""
     scenario = ballistic("courtyard")
-    evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
+    evaluator = BlastEvaluator(scenario, RaysEngine())
     problem = DesignProblem(evaluator, search_set(scenario, None, 1, 0, charges=1))
     genetic, drawn = (
         problem.load(find_proposer(name).propose(problem, 100, 0).layout)
         for name in ("genetic", "random")
     )
-    assert genetic < drawn
+    assert genetic < 0.5 * drawn
 
 
 @pytest.mark.parametrize("share", [0.5, 0.0])
