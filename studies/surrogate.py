@@ -193,19 +193,18 @@ def fit_it(
         if (begin_with is None) != (not more):
             raise BlastEnvError("--begin-with and --more go together: give both, or none")
         named = named_rows([*(data or DATA), *(more or ())], without or ())
+        of_more = named["scenario"].isin(named_rows(more)["scenario"] if more else [])
+        groups = (named["scenario_hash"][own].nunique() for own in (~of_more, of_more))
+        _check_held_out(sum(-(-group // every) for group in groups), every)  # at most so many
         samples = samples_of(named)
-        is_more = np.isin(samples.scenario, named_rows(more)["scenario"] if more else [])
+        is_more = np.isin(samples.scenario, named["scenario"][of_more].unique())
         # The sites of --data that are held out stay so, whatever is added.
         held_out = np.zeros(len(samples), dtype=bool)
         for own in (~is_more, is_more):
             held_out[own] = folds(samples.site[own], every, seed)[0] if own.any() else False
         begun = None if begin_with is None else Begun(load_surrogate(begin_with), ~is_more)
-        sites, least = len(np.unique(samples.site[held_out])), _HALVES * least_sites()
-        if sites < least:
-            raise BlastEnvError(
-                f"--every {every} holds out {sites} sites, must be at least {least} for the "
-                "intervals: lower it, or give more sites"
-            )
+        sites = len(np.unique(samples.site[held_out]))
+        _check_held_out(sites, every)
         about = Fit(
             command=_command(),
             versions=versions(),
@@ -228,6 +227,16 @@ def fit_it(
         )
         path = replace(fitted, fit=about).save(out)
         print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
+
+
+def _check_held_out(sites: int, every: int) -> None:
+    """Refuse a number of held-out sites that is too small for intervals."""
+    least = _HALVES * least_sites()
+    if sites < least:
+        raise BlastEnvError(
+            f"--every {every} holds out {sites} sites, must be at least {least} for the "
+            "intervals: lower it, or give more sites"
+        )
 
 
 def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFrame:

@@ -189,8 +189,8 @@ def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Pa
 def test_blasts_without_noise_are_kept_for_a_continued_run(tmp_path: Path) -> None:
     scenario = tmp_path / "yard.toml"
     save_scenario(wide_yard(), scenario)
-    chosen = settings(scenario, engine="gas", steps=4)
-    small = hyperparameters({"n_steps": 4, "batch_size": 4, "n_epochs": 1})
+    chosen = settings(scenario, engine="gas", steps=16)
+    small = hyperparameters({"n_epochs": 1})
     train(chosen, small, tmp_path / "run")
     assert len(BlastStore(tmp_path / "run" / "blasts")) > 0
 

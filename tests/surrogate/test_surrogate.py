@@ -438,7 +438,7 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
         assert found.cases == held[0].sum() / 10
         assert found.rank > 0.9
         assert 0.0 <= found.lost < 0.02
-    once, again = (fit(samples, ~held[0], 1, 0, ABOUT) for _ in range(2))
+    once, again = (fit(samples, held[0], 1, 0, ABOUT) for _ in range(2))
     assert len(once.impulse.members) == len(once.peak.members) == MEMBERS
     assert once.digest == again.digest
     begun = Begun(learnt, ~held[0] & ~held[1])
@@ -453,7 +453,7 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
 
 def test_it_learns_from_messages_what_ways_do_not_see() -> None:
     """Loads go by how near the charge solids stand; of ways nothing is told."""
-    samples = Samples.of(table_of_guesses(by_hand(), 80), {YARD.content_hash: YARD})
+    samples = Samples.of(table_of_guesses(by_hand(), 20), {YARD.content_hash: YARD})
     samples.features[:, FEATURES - SHARES :] = 0.0
     rows = samples.counts * samples.solids
     near = np.add.reduceat(samples.relations[:, 8], np.cumsum([0, *rows[:-1]])) / samples.counts
