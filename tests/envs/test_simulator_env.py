@@ -18,18 +18,19 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.evaluation.engines.gas import GasResult
 from blast_env.site import Scenario, ScenarioError
+from tests.agents.training_runs import small_scenario
 from tests.envs.small import watch
 from tests.gas_sites import WALL, glazed_hut, hut
-from tests.scenarios import BALLISTIC_COURTYARD
 
 pytestmark = pytest.mark.slow
 
+SPARSE = small_scenario()
 LAYOUT = ((4, 0), (5, 0), (6, 0))
 
 
 def make(**arguments: Any) -> BlastSimulatorEnv:
-    """Return an environment on the courtyard in sparse air, unless other arguments are given."""
-    arguments = {"scenario": BALLISTIC_COURTYARD} | arguments
+    """Return an environment on a small site in sparse air, unless other arguments are given."""
+    arguments = {"scenario": SPARSE} | arguments
     env = gym.make("BlastSimulator-v0", **arguments).unwrapped
     assert isinstance(env, BlastSimulatorEnv)
     return env
@@ -52,8 +53,8 @@ def test_it_is_made_for_the_courtyard_and_pymunk_unless_told_otherwise() -> None
 @pytest.mark.parametrize(
     ("scenario", "engine", "step_s"),
     [
-        (BALLISTIC_COURTYARD, "pymunk", 0.0017),  # shorter than most time steps
-        (BALLISTIC_COURTYARD, "pymunk", 10.0),
+        (SPARSE, "pymunk", 0.0017),  # shorter than most time steps
+        (SPARSE, "pymunk", 10.0),
         ("courtyard", "event", 0.01),
     ],
 )
@@ -89,7 +90,7 @@ def test_time_passes_in_steps_of_the_given_length() -> None:
     assert times[0] == 0.0
     counts = np.array([observation["particle_counts"] for observation in observations])
     assert counts[0, 0] == 720
-    assert counts[0, 1] > 100
+    assert counts[0, 1] > 20
     assert (np.diff(counts, axis=0) <= 0).all()
 
 
@@ -108,7 +109,7 @@ def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> Non
     ("options", "error", "words"),
     [
         ({"layuot": ()}, BlastEnvError, "'layuot', did you mean 'layout'"),
-        ({"charge_position_m": (28.0, 15.0)}, ScenarioError, "building"),
+        ({"charge_position_m": (15.0, 7.0)}, ScenarioError, "building"),
     ],
 )
 def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
