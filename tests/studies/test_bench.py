@@ -116,8 +116,8 @@ def test_a_checkout_costs_what_it_costs_itself(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["one", "batch"])
 def test_environments_are_timed_by_the_step(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for steps in ("_SINGLE_STEPS", "_STEPS"):
-        monkeypatch.setattr(f"studies.side_by_side.{steps}", 8)
+    for number in ("_SINGLE_STEPS", "_STEPS"):
+        monkeypatch.setattr(f"studies.side_by_side.{number}", 8)
     monkeypatch.setattr("studies.side_by_side._ENVIRONMENTS", 2)
     spent_s, steps = ROWS[name].prepare()()
     assert spent_s > 0.0
