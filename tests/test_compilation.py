@@ -118,19 +118,15 @@ def test_code_on_disk_serves_while_no_source_changes(package: Path) -> None:
     assert sum(again.stats.cache_hits.values()) == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new", "expected"),
-    [
-        pytest.param("numbers.py", "3.0", "5.0", 20.0, id="constant"),
-        pytest.param("steps.py", "2.0", "4.0", 6.0, id="function"),
-        pytest.param("kernel.py", '"numpy"', '"numpy", fastmath=True', 12.0, id="option"),
-    ],
-)
-def test_a_change_of_any_source_compiles_again(
-    package: Path, name: str, old: str, new: str, expected: float
-) -> None:
-    path = package / name
-    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    changed = kernel_of(package)
-    assert changed(8.0) == expected
-    assert sum(changed.stats.cache_hits.values()) == 0
+def test_a_change_of_any_source_compiles_again(package: Path) -> None:
+    """A constant, a function that the kernel calls, and an option, one after the other."""
+    for name, old, new, expected in (
+        ("numbers.py", "3.0", "5.0", 20.0),
+        ("steps.py", "2.0", "4.0", 10.0),
+        ("kernel.py", '"numpy"', '"numpy", fastmath=True', 10.0),
+    ):
+        path = package / name
+        path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+        changed = kernel_of(package)
+        assert changed(8.0) == expected, name
+        assert sum(changed.stats.cache_hits.values()) == 0, name

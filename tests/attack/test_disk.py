@@ -72,7 +72,7 @@ def _figure(path: Path) -> None:
 
 
 def _film(path: Path) -> None:
-    write_film(_blast(), path, frames_per_s=5.0, slow_motion=10.0, width_px=320)
+    write_film(_blast(), path, frames_per_s=2.0, slow_motion=10.0, width_px=320)
 
 
 class _Corridor(gymnasium.Env[np.ndarray, int]):

@@ -19,6 +19,7 @@ from blast_env.site import Charge, SegmentSource
 from blast_env.surrogate import packaged_surrogate
 from tests.catalogue_sites import wide_yard
 from tests.design.search_cases import small_scenario
+from tests.gas_sites import hut
 
 CHARGE = Charge((5.0, 20.5), 100.0)
 
@@ -79,7 +80,7 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     """That of the package, whose first guess gets the only blast."""
     scenario, out = wide_yard(tnt_kg=1.0), tmp_path / "out"
     save_scenario(scenario, tmp_path / "yard.toml")
-    options = ("--engine", "gas", "--budget", 1, "--held-out", 1, "--out", out)
+    options = ("--engine", "gas", "--cell", 0.5, "--budget", 1, "--held-out", 1, "--out", out)
     result = search("--method", "surrogate", "--scenario", tmp_path / "yard.toml", *options)
     assert result.exit_code == 0, result.output
     assert "1 of 1 blasts spent" in result.stdout
@@ -95,9 +96,10 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert load_layout(out / "layout.json", scenario) == expected.layout != ()
 
 
-def test_a_rule_spends_nothing(site: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    options = ("--scenario", site, "--engine", "gas", "--out", out)
+def test_a_rule_spends_nothing(tmp_path: Path) -> None:
+    out, site = tmp_path / "out", tmp_path / "hut.toml"
+    save_scenario(hut(), site)
+    options = ("--scenario", site, "--engine", "gas", "--cell", 0.5, "--out", out)
     result = search("--method", "wall_near_charge", *options)
     assert result.exit_code == 0, result.output
     assert "0 of 200 blasts spent" in result.stdout
