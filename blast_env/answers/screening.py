@@ -66,6 +66,7 @@ def screening_answer(
         yield Table.of("what stands around, by the atlas of shielding", _AROUND, around)
     for threat in found.threats:
         yield from map(Line.of, _unknown_words(threat))
+        yield from map(Line.of, _edge_words(threat))
     for threat in found.threats:
         title = (
             f"stand-off in the open (m) from which a component allows a level, {threat.name},"
@@ -119,6 +120,17 @@ def _factor_words(bay: BayScreening) -> str:
     return f"{bay.filled.bay.name}: x {middle:.2f}, {low:.2f} to {high:.2f}"
 
 
+def _edge_words(threat: ThreatScreening) -> Iterator[str]:
+    """Yield what edges of walls and slanting waves do to the impulses of the curves."""
+    changed = [bay.edges for bay in threat.bays if bay.edges != 1.0]
+    if changed:
+        yield (
+            f"{threat.name}: impulses of {count_of('bay', len(changed))} are x {min(changed):.2f}"
+            f" to {max(changed):.2f} of the curves' for the edges of walls and the angle of the"
+            " wave"
+        )
+
+
 def _unknown_words(threat: ThreatScreening) -> Iterator[str]:
     """Yield what lies outside the range of the atlas, with the number of its bays."""
     counts: dict[str, int] = {}
@@ -128,8 +140,8 @@ def _unknown_words(threat: ThreatScreening) -> Iterator[str]:
     for words, count in counts.items():
         yield (
             f"{threat.name}: {count_of('bay', count)} outside the range of the atlas: {words}:"
-            " obstacles take nothing off there, fronts count as at the end of the range; a blast by"
-            " gas decides"
+            " obstacles take nothing off there, fronts count as at the end of the range, a charge"
+            " against a wall as up to twice its mass; a blast by gas decides"
         )
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 from blast_env.answers.assess import cells_words
 from blast_env.answers.document import AnyCell, AnyPart, Line, Number, Table, interval
+from blast_env.design.by_atlas import WORSE
 from blast_env.design.search import DesignProblem, SearchResult
 from blast_env.evaluation import Evaluation
 from blast_env.geometry import Layout, layout_counts
@@ -67,6 +68,8 @@ def search_answer(run: SearchRun, checked: Evaluation | None) -> Iterator[AnyPar
         )
     if result.by and not result.layout:
         yield Line.of(f"nothing is placed: {result.by}")
+    if result.by == WORSE:
+        yield Line.of(f"{result.method}: {result.by}", kind="flag")
     yield Line.of(
         f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
@@ -111,6 +114,9 @@ def judged_answer(
     yield Table.of(title, ("layout", "load", "reduction"), rows)
     if judged.grid_error is not None:
         yield Line.of(cells_words(judged.grid_error))
+    worse = [name for name in best_last if loads[name] > loads[nothing]]
+    if worse:
+        yield Line.of(f"these make the site worse: {', '.join(worse)}", kind="flag")
     if best_last and loads[best_last[-1]] < loads[proposal]:
         yield Line.of(f"note: {best_last[-1]} does better here than the proposal")
 

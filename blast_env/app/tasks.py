@@ -81,7 +81,7 @@ class SearchTask(BlastingTask):
         if result.load is None and result.interrupted:
             raise KeyboardInterrupt
         if result.load is None:
-            words = result.expectation if result.layout else result.by
+            words = (result.expectation or result.by) if result.layout else result.by
             text = f"{placing.counted(self.site, result.layout)}, proposed by "
             text += f"{proposer_row(self.method).title}{words and f', {words}'}"
         else:

@@ -63,13 +63,14 @@ class Factors(NamedTuple):
         return counted
 
     def times(self, other: "Factors") -> "Factors":
-        """Return the products of both."""
-        return Factors(
-            self.middle * other.middle,
-            self.low * other.low,
-            self.high * other.high,
-            self.in_range & other.in_range,
+        """Return the products of both; their errors are independent, so their squares add up."""
+        middle = self.middle * other.middle
+        below, above = (
+            np.hypot(np.log(first / self.middle), np.log(second / other.middle))
+            for first, second in ((self.low, other.low), (self.high, other.high))
         )
+        known = self.in_range & other.in_range
+        return Factors(middle, middle * np.exp(-below), middle * np.exp(above), known)
 
     def least(self, other: "Factors") -> "Factors":
         """Return the smaller one of both for each bay and load."""
@@ -187,6 +188,7 @@ class Laws(BaseModel):
     """The laws of the atlas.
 
     Attributes:
+        edges: Of walls in the open that face the charge, relative to the curves.
         between: Of obstacles between charge and bay.
         opposite: Of fronts opposite a bay that throw the wave back: streets, a front behind the
             charge.
@@ -197,6 +199,7 @@ class Laws(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    edges: Law
     between: Law
     opposite: Law
     beside: Law

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.atlas import between, echoes, shadow
-from blast_env.atlas.laws import LOADS, Factors, Laws, packaged_laws
+from blast_env.atlas import between, echoes, edges, shadow
+from blast_env.atlas.laws import Factors, Laws, packaged_laws
 from blast_env.site.blast_site import BlastSite
 
 _NOTICED: Final = 0.02
@@ -69,12 +69,16 @@ class Walls:
         normals: Their outward normals (bays, 3).
         structures: Name of the structure of each bay.
         high_m: Height of it (bays,).
+        ends_m: Distances of the middles from both ends of the wall (bays, 2).
+        before_m: How far they lie before the wall (bays,).
     """
 
     middles_m: FloatArray
     normals: FloatArray
     structures: tuple[str, ...]
     high_m: FloatArray
+    ends_m: FloatArray
+    before_m: FloatArray
 
     def groups(self) -> list[IntArray]:
         """Return the bays of each wall, by their indices."""
@@ -89,17 +93,29 @@ class Surroundings:
     """What surrounds the bays of a site for one place of a charge.
 
     Attributes:
-        factors: Factors on the loads of the open ground: reflected of walls that face the charge,
-            side-on of those that do not.
+        edges: Factors on the loads of the curves, in the open: for the edges of the wall and the
+            angle of the wave. 1 for walls that face away.
+        factors: Factors on those loads for what stands around.
         faces: Whether each bay faces the charge (bays,).
         words: What each bay has, with the name of the obstacle; empty in the open.
         unknown: What each bay has outside the range of the laws; empty if nothing.
     """
 
+    edges: Factors
     factors: Factors
     faces: BoolArray
     words: tuple[str, ...]
     unknown: tuple[str, ...]
+
+    @property
+    def likely(self) -> FloatArray:
+        """Best estimates of the factors (bays, 2)."""
+        return self.edges.middle * self.factors.middle
+
+    @property
+    def counted(self) -> FloatArray:
+        """Factors for the loads (bays, 2), of impulses and peaks."""
+        return self.edges.times(self.factors).counted
 
 
 class SiteAtlas:
@@ -127,8 +143,7 @@ class SiteAtlas:
         walls, count = self._walls, len(self._walls.middles_m)
         charge = np.array(charge_m) / scale
         solid = replace(self._solid, boxes=self._solid.boxes / scale)
-        one = np.ones((count, len(LOADS)))
-        factors = Factors(one, one.copy(), one.copy(), np.ones(count, dtype=bool))
+        own_edges, factors = _ones(count), _ones(count)
         words, unknown = [""] * count, [""] * count
         faces = np.zeros(count, dtype=bool)
         for bays in self._groups:
@@ -137,22 +152,35 @@ class SiteAtlas:
                 walls.middles_m[bays] / scale,
                 walls.normals[bays[0]],
                 walls.high_m[bays] / scale,
+                walls.ends_m[bays] / scale,
             )
-            if float((charge - wall.middles[0]) @ wall.normal) > 0.0:
+            before = float(walls.before_m[bays[0]]) / scale
+            if float((charge - wall.middles[0]) @ wall.normal) > -before:
                 faces[bays] = True
                 own = self._facing(wall, solid)
             else:
                 own = self._away(wall, solid, walls.structures[bays[0]])
-            for target, values in zip(factors, own.factors, strict=True):
-                target[bays] = values
+            for whole, part in ((own_edges, own.edges), (factors, own.factors)):
+                for target, values in zip(whole, part, strict=True):
+                    target[bays] = values
             for index, name, missing in zip(bays.tolist(), own.words, own.unknown, strict=True):
                 words[index], unknown[index] = name, missing
-        return Surroundings(factors, faces, tuple(words), tuple(unknown))
+        return Surroundings(own_edges, factors, faces, tuple(words), tuple(unknown))
+
+    def _edges(self, wall: "_Wall") -> tuple[Factors, str]:
+        """Return what the edges of a wall do, and a word if the charge is too near to it."""
+        law = self._laws.edges
+        numbers = edges.numbers_of_edges(
+            wall.charge, wall.middles, wall.normal, wall.ends, wall.high
+        )
+        near = "a charge that stands against the wall" if edges.is_against(law, numbers) else ""
+        return edges.factors_of_edges(law, numbers), near
 
     def _facing(self, wall: "_Wall", solid: Solid) -> Surroundings:
         """Return what shields a wall that faces the charge, and what throws waves back on it."""
         count = len(wall.middles)
-        factors, words, unknown = Factors.none(count), [""] * count, [""] * count
+        (own_edges, near), every = self._edges(wall), np.ones(count, dtype=bool)
+        factors, words, unknown = Factors.none(count), [""] * count, [near] * count
         governing: list[tuple[Factors, str]] = []
         for row in between.rows_between(wall.charge, wall.middles, wall.normal, solid.boxes):
             own = self._laws.between.factors(between.numbers_between(row, wall.charge))
@@ -162,11 +190,10 @@ class SiteAtlas:
         for own, name in governing:
             counts = own.middle[:, 0] <= factors.middle[:, 0]  # the row that takes most
             _note(words, unknown, name, own, counts)
-        boxes = solid.boxes[
-            solid.is_building & between.lies_before(wall.middles, wall.normal, solid.boxes)
-        ]
+        # Pieces throw the wave back like fronts: a row behind a charge, or beside a bay.
+        boxes = solid.boxes[between.lies_before(wall.middles, wall.normal, solid.boxes)]
         if not len(boxes):
-            return Surroundings(factors, np.ones(count, bool), tuple(words), tuple(unknown))
+            return Surroundings(own_edges, factors, every, tuple(words), tuple(unknown))
         numbers = echoes.numbers_of_echoes(wall.charge, wall.middles, wall.normal, boxes, wall.high)
         for law, name in (
             (self._laws.opposite, "a front opposite"),
@@ -175,9 +202,9 @@ class SiteAtlas:
             if law.gate(numbers).max() == 0.0:
                 continue
             own = law.factors(numbers)
-            _note(words, unknown, name, own, np.ones(count, dtype=bool))
+            _note(words, unknown, name, own, every)
             factors = factors.times(own)
-        return Surroundings(factors, np.ones(count, bool), tuple(words), tuple(unknown))
+        return Surroundings(own_edges, factors, every, tuple(words), tuple(unknown))
 
     def _away(self, wall: "_Wall", solid: Solid, structure: str) -> Surroundings:
         """Return the shadow on a wall of a rectangular building that faces away.
@@ -186,9 +213,9 @@ class SiteAtlas:
         """
         count = len(wall.middles)
         own = [index for index, name in enumerate(solid.structures) if name == structure]
-        none = ("",) * count
+        alone, hidden, nothing = Factors.none(count), np.zeros(count, dtype=bool), ("",) * count
         if len(own) != 1:
-            return Surroundings(Factors.none(count), np.zeros(count, bool), none, none)
+            return Surroundings(alone, alone, hidden, nothing, nothing)
         box = solid.boxes[own[0]]
         normals = np.broadcast_to(wall.normal, (count, 3))
         numbers = shadow.numbers_of_shadow(wall.charge, wall.middles, normals, box)
@@ -201,9 +228,7 @@ class SiteAtlas:
         words, unknown = [""] * count, [""] * count
         every = np.ones(count, dtype=bool)
         _note(words, unknown, name, factors, every)
-        return Surroundings(
-            factors.where_known(), np.zeros(count, bool), tuple(words), tuple(unknown)
-        )
+        return Surroundings(alone, factors.where_known(), hidden, tuple(words), tuple(unknown))
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +239,12 @@ class _Wall:
     middles: FloatArray
     normal: FloatArray
     high: FloatArray
+    ends: FloatArray
+
+
+def _ones(bays: int) -> Factors:
+    """Return factors of 1 in arrays of their own, to be filled."""
+    return Factors(*(own.copy() for own in Factors.none(bays)))
 
 
 def _note(

@@ -42,6 +42,7 @@ from blast_env.cli.output import (
     resumable,
     save_pictures,
 )
+from blast_env.design.by_atlas import word_on
 from blast_env.design.proposal import problem_of, search_problem
 from blast_env.design.rules import expected_charge
 from blast_env.design.search import (
@@ -407,6 +408,9 @@ def _proposal_without_blasts(
     print_line(
         f"{scenario.name}: {proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
     )
+    word = word_on(problem, result.layout)
+    if word:
+        print_line(f"note: {word}")
     if out is not None:
         make_folder(out)
         provenance = {**digests, "command": command(), "versions": versions()}

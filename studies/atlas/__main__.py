@@ -19,6 +19,7 @@ from blast_env.provenance import versions
 from blast_env.tables import markdown_table
 from blast_env.units import MODULE_SIDE_M
 from studies.atlas import findings
+from studies.atlas.clipping import Clipping
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES, fit_all
 from studies.atlas.runs import (
@@ -31,7 +32,7 @@ from studies.atlas.runs import (
     run_group,
     table_of_runs,
 )
-from studies.atlas.samples import Bays, scenes_with_loads
+from studies.atlas.samples import Bays, Group, scenes_with_loads
 from studies.atlas.scenes import CUBE_ROOT, scaled_impulse
 from studies.atlas.sites import SITES, on_site
 
@@ -108,7 +109,7 @@ def fit(
             "blasts": str(int((frame["cell_m"] == COARSE.cell_m).sum())),
             **versions(COARSE.version, ("numpy", "scipy")),
         }
-        found = fit_all(_scenes(frame), about)
+        found = fit_all(_groups(frame), about)
         make_folder(out.parent)
         write_text(out, found.model_dump_json(indent=1) + "\n")
         _print_errors(found)
@@ -164,8 +165,7 @@ def check(
             for done, (name, number) in enumerate(asked):
                 run_group(name, number, False, out)
                 progress((done + 1) / len(asked))
-        scenes = [*scenes_with_loads(groups_in(out))]
-        rows = findings.inside_rows(scenes, packaged_laws(), names)
+        rows = findings.inside_rows([*groups_in(out)], packaged_laws(), names)
         headers = ("family", "blasts", "bays in range", "impulse, error of ln", "peak, error of ln")
         more = ("impulses inside", "peaks inside", "impulses too low", "peaks too low")
         print_line(markdown_table((*headers, *more), rows))
@@ -196,15 +196,18 @@ def cases(
 @app.command()
 def sites(
     name: Annotated[list[str] | None, typer.Argument(help="Bundled sites.")] = None,
+    data: Data = DATA,
     out: Annotated[Path, typer.Option(help="Folder of the blasts.")] = Path("out/atlas_sites"),
 ) -> None:
     """Compare screening without and with the atlas with gas dynamics, bay by bay."""
     with user_errors():
+        frame = _read(data)
+        clipping = Clipping.of(*(groups_of(frame, own.cell_m) for own in (COARSE, FINE)))
         found = [
             own
             for site in name or SITES
             for has_layout in (False, True)
-            for own in on_site(site, has_layout, packaged_laws(), out)
+            for own in on_site(site, has_layout, packaged_laws(), clipping, out)
         ]
         headers = ("site", "layout", "bays", "impulse, error of ln", "peak, error of ln")
         more = ("gas over screening, impulse", "peak")
@@ -230,8 +233,12 @@ def _read(data: Path) -> pd.DataFrame:
     return read_frame(data, COLUMNS)
 
 
+def _groups(frame: pd.DataFrame) -> list[Group]:
+    return [*groups_of(frame, COARSE.cell_m)]
+
+
 def _scenes(frame: pd.DataFrame) -> list[Bays]:
-    return [*scenes_with_loads(groups_of(frame, COARSE.cell_m))]
+    return [*scenes_with_loads(_groups(frame))]
 
 
 def _print_errors(found: Laws) -> None:

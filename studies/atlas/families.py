@@ -258,6 +258,12 @@ def _shadow(site: Numbers, _: list[Numbers]) -> list[Scene]:
     return [Scene(numbers, box, ("west", "east", "south", "north"))]
 
 
+def _open(site: Numbers, _: list[Numbers]) -> list[Scene]:
+    """Return a facade in the open, of any width."""
+    box, numbers, up = _facade(site, _modules(site["width"], 6))
+    return [Scene({**numbers, "width": box.width / MODULES}, box, up=up)]
+
+
 def _rows(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     """Return a facade alone, then behind a house, or behind two with a gap between them."""
     box, numbers, up = _facade(site)
@@ -355,8 +361,13 @@ def _table() -> Iterator[Family]:
     yield Family("rows", "a second row of houses", second, rows, 7, _rows)
     canopy = {"depth": (0.1, 1.2), "level": (0.25, 0.9), "kind": (0.0, 3.0)}
     yield Family("canopy", "a canopy, storeys that project, a podium", near, canopy, 6, _canopy)
+    wide = {**_FACADE, "distance": (1.3, 9.0), "width": (0.5, 6.0), "aside": (0.0, 4.0)}
+    wide = {**wide, "facade_height": (0.4, 3.0), "raised": (-0.8, 0.8)}
     raised = {**_FACADE, "raised": (0.05, 1.2)}
     yield Family("raised", "a raised charge, without and with a wall", raised, _WALL, 5, _raised)
+    yield Family("open", "a facade in the open", wide, {}, 0, _open)
+    close = {**wide, "distance": (0.33, 1.3), "width": (0.5, 5.0), "aside": (0.0, 2.5)}
+    yield Family("near", "a facade near the charge", close, {}, 0, _open)
 
 
 FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _table()})

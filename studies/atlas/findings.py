@@ -14,7 +14,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES
-from studies.atlas.samples import Bays, row_between, samples, scenes_with_loads
+from studies.atlas.samples import Bays, Group, row_between, scenes_with_loads
 from studies.atlas.sites import SiteLoads
 
 Row = tuple[str, ...]
@@ -86,13 +86,13 @@ def error_rows(known: Laws) -> Iterator[Row]:
             )
 
 
-def inside_rows(scenes: Sequence[Bays], known: Laws, families: Collection[str]) -> Iterator[Row]:
+def inside_rows(groups: Sequence[Group], known: Laws, families: Collection[str]) -> Iterator[Row]:
     """Yield one row per family: error of ln(factor), and the bays in the intervals."""
     totals = []
     for name, recipe in RECIPES.items():
         law: Law = getattr(known, name)
         for family in (own for own in recipe.families if own in families):
-            own = samples((bays for bays in scenes if bays.family == family), recipe.numbers_of)
+            own = recipe.samples(groups, [family])
             found, ratio = law.factors(own.numbers), np.exp(own.log_change)
             inside = (found.low <= ratio) & (ratio <= found.high)
             over = ratio / found.counted > TOLERATED

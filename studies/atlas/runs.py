@@ -22,22 +22,26 @@ COARSE: Final = GasEngine(cell_m=MODULE_SIDE_M)
 FINE: Final = GasEngine(cell_m=0.5 * MODULE_SIDE_M)
 """Halved cells."""
 
-_OF_A_ROUND: Final = {"shadow": 4}
+_OF_A_ROUND: Final = {"shadow": 4, "rows": 2, "tee": 2, "open": 2, "near": 2}
+_CHECKED: Final = (0, 5, 2)  # families of a round on halved cells; the last one in every other
 _DIGITS: Final = 2
 
 
 def rounds(names: Sequence[str], count: int) -> Iterator[tuple[str, int, bool]]:
     """Yield family, group and whether it runs on halved cells, families in turn.
 
-    Each round runs one family's group on halved cells too, without the other obstacles.
+    Each round runs a group of two or three families on halved cells too, without the other
+    obstacles.
     """
+    checked = [name for name in names if FAMILIES[name].obstacles or name == "shadow"]
     for number in range(count):
         for name in names:
             share = _OF_A_ROUND.get(name, 1)
             for group in range(number * share, (number + 1) * share):
                 yield name, group, False
-        checked = names[number % len(names)]
-        yield checked, number * _OF_A_ROUND.get(checked, 1), True
+        several = _CHECKED[: (2 + number % 2) * bool(checked)]
+        for name in dict.fromkeys(checked[(number + more) % len(checked)] for more in several):
+            yield name, number, True
 
 
 def run_group(name: str, number: int, fine: bool, folder: Path) -> int:

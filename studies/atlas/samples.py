@@ -2,16 +2,30 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas.between import numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.edges import NUMBERS as EDGES
+from blast_env.atlas.edges import numbers_of_edges
 from blast_env.atlas.shadow import numbers_of_shadow
 from blast_env.curves import Ways, in_the_open
 from studies.atlas.scenes import CUBE_ROOT, MODULES
+
+Group = Mapping[str, Any]
+"""A group of scenes as plain data, from a file or a table."""
+
+LEAST_DISTANCE: Final = 1.3
+"""Nearest bays of the law of edges, m/kg^(1/3); walls may be breached from 1.7 inwards."""
+
+LEAST_TO_WALL: Final = 0.3
+"""Least distance of the charge from their wall; its source needs 0.33."""
+
+OPEN: Final = "open"
+"""Family of walls in the open; the first scenes of the others count among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +62,7 @@ class Bays:
         return np.full(len(self.middles), self.judged[5])
 
 
-def scenes_with_loads(groups: Iterable[Mapping[str, Any]]) -> Iterator[Bays]:
+def scenes_with_loads(groups: Iterable[Group]) -> Iterator[Bays]:
     """Yield the scenes of groups with the change of their loads.
 
     Loads are relative to those of the group's first scene, those of shadows to the side-on load.
@@ -63,24 +77,44 @@ def scenes_with_loads(groups: Iterable[Mapping[str, Any]]) -> Iterator[Bays]:
         for number, scene in enumerate(scenes):
             if scene["up"] != first["up"] or (number == 0) != (group["family"] == "shadow"):
                 continue
-            bays = Bays(
-                family=group["family"],
-                group=group["group"],
-                scene=number,
-                numbers=scene["numbers"],
-                charge=np.array([0.0, 0.0, scene["up"] / MODULES]),
-                middles=np.array(scene["middles"]),
-                normals=np.array(scene["normals"]),
-                boxes=_boxes(scene["others"]),
-                judged=_boxes([scene["judged"]])[0],
-                log_change=np.empty((0, 2)),
-            )
-            loads = np.column_stack([scene["impulse"], scene["peak"]])
+            bays, loads = _bays_of(group, number)
             if group["family"] == "shadow":
-                before = side_on(bays)
+                before = curves_at(bays, False)
             else:
                 before = np.array([known[name] for name in scene["bays"]])
             yield replace(bays, log_change=np.log(loads / before))
+
+
+def walls_in_the_open(groups: Iterable[Group]) -> Iterator[Bays]:
+    """Yield the first scenes of groups, a building in the open; loads over those of the curves."""
+    for number, group in enumerate(groups):
+        bays, loads = _bays_of(group, 0)
+        change = np.log(loads / curves_at(bays, True))
+        yield replace(bays, family=OPEN, group=number, log_change=change)
+
+
+def impulses_in_the_open(groups: Iterable[Group]) -> Iterator[Bays]:
+    """Yield walls in the open with the peaks of the curves: cells clip them, edges do not."""
+    for bays in walls_in_the_open(groups):
+        yield replace(bays, log_change=bays.log_change * np.array([1.0, 0.0]))
+
+
+def _bays_of(group: Group, number: int) -> tuple[Bays, FloatArray]:
+    """Return the bays of a scene without changes, and their impulses and peaks (bays, 2)."""
+    scene = group["scenes"][number]
+    bays = Bays(
+        family=group["family"],
+        group=group["group"],
+        scene=number,
+        numbers=scene["numbers"],
+        charge=np.array([0.0, 0.0, scene["up"] / MODULES]),
+        middles=np.array(scene["middles"]),
+        normals=np.array(scene["normals"]),
+        boxes=_boxes(scene["others"]),
+        judged=_boxes([scene["judged"]])[0],
+        log_change=np.empty((0, 2)),
+    )
+    return bays, np.column_stack([scene["impulse"], scene["peak"]])
 
 
 def _boxes(boxes: list[Mapping[str, float]]) -> FloatArray:
@@ -94,15 +128,25 @@ def _boxes(boxes: list[Mapping[str, float]]) -> FloatArray:
     return np.array(rows, dtype=float).reshape(-1, 6) / MODULES
 
 
-def side_on(bays: Bays) -> FloatArray:
-    """Return the side-on impulse over the cube root and the side-on peak of bays (bays, 2)."""
-    unseen = np.zeros(len(bays.middles), dtype=bool)
+def curves_at(bays: Bays, facing: bool) -> FloatArray:
+    """Return the impulse over the cube root and the peak of bays by the curves (bays, 2).
+
+    Args:
+        bays: The bays.
+        facing: Whether walls that face the charge reflect; else all loads are side-on.
+    """
+    seen = np.full(len(bays.middles), facing) & ~_away(bays)
     x_m, y_m, z_m = (CUBE_ROOT * bays.charge).tolist()
-    ways = Ways.between((x_m, y_m, z_m), CUBE_ROOT * bays.middles, bays.normals, unseen)
+    ways = Ways.between((x_m, y_m, z_m), CUBE_ROOT * bays.middles, bays.normals, seen)
     impulse, peak = (
         in_the_open(load, ways, CUBE_ROOT**3, z_m) for load in ("impulse", "overpressure")
     )
     return np.column_stack([impulse / CUBE_ROOT, peak])
+
+
+def _away(bays: Bays) -> BoolArray:
+    """Return whether bays lie on walls that face away from the charge (bays,)."""
+    return np.asarray(((bays.charge - bays.middles) * bays.normals).sum(axis=1) < 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,5 +222,19 @@ def samples_echoes(bays: Bays) -> tuple[FloatArray, BoolArray]:
 def samples_shadow(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of shadows, of walls that face away."""
     found = numbers_of_shadow(bays.charge, bays.middles, bays.normals, bays.judged)
-    away = ((bays.charge - bays.middles) * bays.normals).sum(axis=1) < 0.0
-    return found, away
+    return found, _away(bays)
+
+
+def samples_edges(bays: Bays) -> tuple[FloatArray, BoolArray]:
+    """Return the numbers of walls in the open, of those that face the charge."""
+    low, high = bays.judged[:2], bays.judged[2:4]
+    found = np.empty((len(bays.middles), len(EDGES)))
+    for normal in np.unique(bays.normals, axis=0):
+        own = (bays.normals == normal).all(axis=1)
+        along = int(abs(normal[0]) > 0.5)  # a wall to the west or east runs along y
+        place = bays.middles[own, along]
+        ends = np.column_stack([place - low[along], high[along] - place])
+        found[own] = numbers_of_edges(bays.charge, bays.middles[own], normal, ends, bays.high[own])
+    distance = np.linalg.norm(bays.charge - bays.middles, axis=1)
+    to_wall = ((bays.charge - bays.middles) * bays.normals).sum(axis=1)
+    return found, (distance >= LEAST_DISTANCE) & (to_wall >= LEAST_TO_WALL)

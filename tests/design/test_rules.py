@@ -21,7 +21,9 @@ from blast_env.design import (
     wall_near_charge,
     why_no_wall,
 )
-from blast_env.design.search import layouts_by_rule
+from blast_env.design.by_atlas import WORSE
+from blast_env.design.proposal import problem_of
+from blast_env.design.search import find_proposer, layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.geometry import Layout, Piece
@@ -389,3 +391,15 @@ def test_pieces_keep_off_all_places_where_a_known_charge_may_be() -> None:
     (threat,) = draw_threats(scenario, [0])
     for layout in layouts_by_rule(scenario, threat.charge).values():
         assert check_layout(scenario, layout) == layout
+
+
+@pytest.mark.parametrize(
+    ("rule", "worse"),
+    [("ring_around_building", True), ("wall_near_building", True), ("wall_in_middle", False)],
+)
+def test_a_rule_that_makes_a_site_worse_comes_with_the_word(rule: str, worse: bool) -> None:
+    """By gas dynamics the first two of hotel_forecourt add 9 %, the third takes off 56 %."""
+    problem = problem_of("hotel_forecourt", None)
+    found = find_proposer(rule).propose(problem)
+    assert found.layout
+    assert (found.by == WORSE) == worse

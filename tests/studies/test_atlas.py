@@ -68,20 +68,38 @@ def test_families_take_turns() -> None:
         ("wall", 1, False),
         ("posts", 1, False),
     ]
-    assert [own for own in asked if own[2]] == [("wall", 0, True), ("posts", 1, True)]
+    assert [own for own in asked if own[2]] == [
+        ("wall", 0, True),
+        ("posts", 0, True),
+        ("posts", 1, True),
+        ("wall", 1, True),
+    ]
 
 
 def test_the_packaged_laws_hold_the_published_blasts() -> None:
     """The table has every scene whole, and most of its bays lie in the intervals."""
     table = read_frame(DATA, COLUMNS)
     chosen = table[table["family"].isin(FITTED)]
-    scenes = [*scenes_with_loads(groups_of(chosen, MODULE_SIDE_M))]
+    groups = [*groups_of(chosen, MODULE_SIDE_M)]
+    scenes = [*scenes_with_loads(groups)]
     assert len(scenes) > 200
-    rows = {title: row for title, *row in inside_rows(scenes, packaged_laws(), FITTED)}
+    rows = {title: row for title, *row in inside_rows(groups, packaged_laws(), FITTED)}
     assert int(rows["all"][0]) == len(scenes)
     for title in ("a front behind the charge", "the walls of a block out of sight"):
         shares = [float(share.split()[0]) for share in rows[title][4:6]]
         assert min(shares) > 85.0
+
+
+def test_impulses_in_the_open_have_the_edges_of_the_wall() -> None:
+    """On a small front the curves are over a quarter too high, the law within 8 %."""
+    scene = Scene({}, Box(46, -7, 6, 14, 8))
+    by_gas = loads_of(scene, COARSE).impulse.mean() * CUBE_ROOT
+    curves, law = (
+        np.mean([bay.likely_pa_s for bay in screen(scene.scenario(), (), (), own).threats[0].bays])
+        for own in (None, packaged_laws())
+    )
+    assert curves > 1.25 * by_gas
+    assert law == pytest.approx(by_gas, rel=0.08)
 
 
 def test_new_designs_are_run_and_judged(tmp_path: Path) -> None:
@@ -103,7 +121,7 @@ def test_a_house_behind_the_shadow_takes_the_shadow_away_and_is_named() -> None:
     alone, behind = screened
     assert loads[1] > 2.0 * loads[0]
     for bay in alone:
-        assert bay.factor[0] < 0.6
+        assert bay.factor[0] < 0.7
         assert (bay.around, bay.unknown) == ("in the shadow of its building", "")
     for bay in behind:
         assert bay.factor == (1.0, 1.0, 1.0)

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from blast_env.design import bollards, rules
+from blast_env.design.by_atlas import word_on
 from blast_env.design.search.problem import Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
@@ -95,12 +96,17 @@ class RuleProposer:
     ) -> SearchResult:
         """Return the rule's layout, which is independent of budget and seed.
 
+        `by` has a word if the layout takes nothing off by the atlas of shielding.
+
         Raises:
             BlastEnvError: If the rule has no layout for the site, for example without a line of
                 sight.
         """
         layout = tuple(sorted(self.rule(problem.scenario, problem.known_charge)))
-        by = "" if layout else why_nothing(problem.scenario, problem.known_charge)
+        if layout:
+            by = word_on(problem, layout)
+        else:
+            by = why_nothing(problem.scenario, problem.known_charge)
         return SearchResult(layout, self.name, by, budget=budget, seed=seed)
 
 

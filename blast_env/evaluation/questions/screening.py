@@ -50,8 +50,8 @@ from blast_env.units import MODULE_SIDE_M
 
 LEFT_OUT: Final = (
     "left out: surroundings outside the range of the atlas, walls and pieces that fail or move,"
-    " clearing round edges, suction, and breaching nearer than 1.7 m/kg^(1/3); stand-offs are those"
-    " of open ground, and streets and courts need more"
+    " suction, and breaching nearer than 1.7 m/kg^(1/3); stand-offs are those of open ground and"
+    " endless walls, and streets and courts need more"
 )
 """What screening does not know."""
 
@@ -90,6 +90,8 @@ class BayScreening:
         around: What stands around it and changes its load; empty in the open.
         unknown: What stands around it outside the range of the atlas.
         factor: What that does to the impulse: best estimate, lower and upper end.
+        edges: What the edges of its wall and the angle of the wave do to the impulse of the curves.
+        likely_pa_s: The best estimate of the impulse; what counts is on the safe side of it.
     """
 
     filled: FacadeBay
@@ -101,6 +103,8 @@ class BayScreening:
     around: str = ""
     unknown: str = ""
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    edges: float = 1.0
+    likely_pa_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -305,6 +309,25 @@ def stand_offs(
     return tuple(found)
 
 
+def likely_impulses(
+    scenario: Scenario, layout: Sequence[Element], charges: Iterable[Charge], atlas: Laws
+) -> Mapping[str, FloatArray]:
+    """Return the best estimates of the impulses of bays, Pa s, by name; (charges,) each.
+
+    The laws of an atlas count. Bays that a structure or piece covers are left out.
+    """
+    facade = _Facade.of(scenario, layout, scenario.bays_with(layout))
+    laws, found = SiteAtlas(facade.site, facade.walls, atlas), []
+    for charge in charges:
+        (x_m, y_m), tnt_kg, height_m = charge
+        place_m = (x_m, y_m, height_m)
+        around = laws.around(place_m, float(np.cbrt(tnt_kg)))
+        ways = Ways.between(place_m, facade.middles_m, facade.outward, around.faces)
+        found.append(in_the_open("impulse", ways, tnt_kg, height_m) * around.likely[:, 0])
+    names = (own.bay.name for own in facade.bays)
+    return dict(zip(names, np.stack(found, axis=1), strict=True))
+
+
 class _Curves:
     """Kingery and Bulmash's loads of one charge in the open."""
 
@@ -356,12 +379,14 @@ class _Facade:
         bays: The bays.
         middles_m: Their middles, before the modules of oblique walls (bays, 3).
         outward: Their outward normals (bays, 3).
+        ends_m: Distances of the middles from both ends of the wall (bays, 2).
         site: The site with a charge that does not count.
     """
 
     bays: tuple[FacadeBay, ...]
     middles_m: FloatArray
     outward: FloatArray
+    ends_m: FloatArray
     site: BlastSite
 
     @classmethod
@@ -375,7 +400,7 @@ class _Facade:
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
         free = ~_covered(site, before_m)
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
-        return cls(kept, before_m[free], normals[free], site)
+        return cls(kept, before_m[free], normals[free], _ends_m(bays)[free], site)
 
     @property
     def walls(self) -> Walls:
@@ -385,8 +410,16 @@ class _Facade:
             tops_m = [block.height_m for block in outline.blocks if block.height_m is not None]
             high_m[outline.name] = max(tops_m, default=0.0)
         names = tuple(own.bay.structure for own in self.bays)
+        # On the wall again, but for oblique walls, whose modules reach beyond the line.
+        oblique = np.abs(self.outward[:, :2]).max(axis=1) < 1.0 - 1e-9
+        back_m = np.where(oblique, 0.0, MODULE_SIDE_M)
         return Walls(
-            self.middles_m, self.outward, names, np.array([high_m[name] for name in names])
+            self.middles_m - back_m[:, np.newaxis] * self.outward,
+            self.outward,
+            names,
+            np.array([high_m[name] for name in names]),
+            self.ends_m,
+            MODULE_SIDE_M - back_m,
         )
 
     @cached_property
@@ -412,6 +445,18 @@ class _Facade:
             charge_m = (*place.position_m, place.height_m)
             found.append(Ways.between(charge_m, self.middles_m, self.outward, seen))
         return Ways(*(np.stack(own) for own in zip(*found, strict=True)))
+
+
+def _ends_m(bays: Sequence[FacadeBay]) -> FloatArray:
+    """Return the distances of the middles of bays from both ends of their wall (bays, 2)."""
+    walls = [(own.bay.structure, own.bay.wall, own.bay.line_number) for own in bays]
+    spans = np.array([(own.bay.left_m, own.bay.right_m) for own in bays])
+    _, wall = np.unique([repr(key) for key in walls], return_inverse=True)
+    low, high = np.full(wall.max() + 1, np.inf), np.full(wall.max() + 1, -np.inf)
+    np.minimum.at(low, wall, spans[:, 0])
+    np.maximum.at(high, wall, spans[:, 1])
+    middle = spans.mean(axis=1)
+    return np.column_stack([middle - low[wall], high[wall] - middle])
 
 
 def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
@@ -497,8 +542,10 @@ def _screened(
         # takes nothing off.
         seen = ways._replace(seen=np.stack([own.faces for own in around]))
     peaks, impulses = (in_the_open(part, seen, tnt_kg, height_m) for part in _LOADS)
+    likely = impulses
     if around:
-        factors = np.stack([own.factors.counted for own in around])
+        likely = impulses * np.stack([own.likely[:, 0] for own in around])
+        factors = np.stack([own.counted for own in around])
         impulses, peaks = impulses * factors[..., 0], peaks * factors[..., 1]
     numbers, parts = facade.kinds
     damage = np.zeros(peaks.shape)
@@ -513,6 +560,7 @@ def _screened(
         response = respond([filled], *triangle(*load))
         away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
         found = BayScreening(filled, float(away_m), bool(is_seen), *load, response)
+        found = replace(found, likely_pa_s=float(likely[worst, index]))
         if around:
             own = around[worst]
             middle, low, high = (float(part[index, 0]) for part in own.factors[:3])
@@ -521,6 +569,7 @@ def _screened(
                 around=own.words[index],
                 unknown=own.unknown[index],
                 factor=(middle, low, high),
+                edges=float(own.edges.middle[index, 0]),
             )
         bays.append(found)
     return ThreatScreening(name, places[worst], len(places), tuple(bays))
