@@ -58,7 +58,7 @@ def rows_between(
     """Return the rows of obstacles between a charge and the bays of one wall.
 
     Args:
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
         bays: Middles of the bays (bays, 3).
         normal: Outward normal of their wall (3,).
         boxes: Low x, y, high x, y, base and top of each obstacle (boxes, 6).
@@ -70,7 +70,7 @@ def rows_between(
         return []
     own = boxes[before]
     corners = np.stack([own[:, [0, 1]], own[:, [2, 1]], own[:, [2, 3]], own[:, [0, 3]]], axis=1)
-    parts = _Parts.of(charge, bays, own, corners)
+    parts = _Parts.of(np.broadcast_to(charge, bays.shape), bays, own, corners)
     middle = 0.5 * (own[:, [0, 1]] + own[:, [2, 3]]) @ normal[:2]
     order = np.argsort(middle)
     starts = np.flatnonzero(np.diff(middle[order]) > _TOGETHER) + 1
@@ -94,17 +94,20 @@ class _Parts:
         from scipy.special import ndtr  # takes a while to import
 
         # (1) Coordinates along the straight way in plan, s, and across it, e.
-        plan = bays[:, :2] - charge[:2]
+        plan = bays[:, :2] - charge[:, :2]
         length = np.maximum(np.linalg.norm(plan, axis=1), _LEAST)
         unit = plan / length[:, np.newaxis]
-        from_charge = corners - charge[:2]  # (boxes, 4, 2)
-        s = np.einsum("bcx,nx->nbc", from_charge, unit)
-        e = np.einsum("bcx,nx->nbc", from_charge, np.stack([-unit[:, 1], unit[:, 0]], axis=1))
+        # e = x . (-u_y, u_x), with x from the charge: one term for the corner, one for the charge.
+        aside = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+        flat = corners.reshape(-1, 2)
+        shape = (len(bays), *corners.shape[:2])
+        s = (unit @ flat.T - (unit * charge[:, :2]).sum(axis=1, keepdims=True)).reshape(shape)
+        e = (aside @ flat.T - (aside * charge[:, :2]).sum(axis=1, keepdims=True)).reshape(shape)
         # (2) Where the way enters and leaves the box, or else its corner nearest to the way.
-        low, high = boxes[:, :2] - charge[:2], boxes[:, 2:4] - charge[:2]
+        at = charge[:, np.newaxis, :2]
+        low, high = boxes[:, :2] - at, boxes[:, 2:4] - at  # (bays, boxes, 2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            first = low[np.newaxis] / unit[:, np.newaxis]
-            last = high[np.newaxis] / unit[:, np.newaxis]
+            first, last = low / unit[:, np.newaxis], high / unit[:, np.newaxis]
         inside = (low < 0.0) & (high > 0.0)  # for ways along an axis
         level = np.abs(unit)[:, np.newaxis] < 1e-9
         near = np.where(level, np.where(inside, -np.inf, np.inf), np.minimum(first, last))
@@ -119,10 +122,11 @@ class _Parts:
         valid = (along > 0.0) & (along < whole) & (~cuts | (leave > enter))
         # (3) The bell there, and its shares across and up; the ground mirrors it.
         share = np.clip(along / whole, 0.0, 1.0)
-        slope = np.sqrt(1.0 + ((bays[:, 2] - charge[2]) / length) ** 2)[:, np.newaxis]
+        slope = np.sqrt(1.0 + ((bays[:, 2] - charge[:, 2]) / length) ** 2)[:, np.newaxis]
         d1 = np.maximum(along * slope, _LEAST)
         d2 = np.maximum((whole - along) * slope, _LEAST)
-        line = charge[2] + (bays[:, 2, np.newaxis] - charge[2]) * share
+        up = charge[:, 2, np.newaxis]
+        line = up + (bays[:, 2, np.newaxis] - up) * share
         taken = np.empty((*along.shape, len(WIDTHS)))
         left, right = e.min(axis=2), e.max(axis=2)
         for k, width in enumerate(WIDTHS):
@@ -133,8 +137,8 @@ class _Parts:
                 mirrored = ndtr((height - line) / bell) + ndtr((height + line) / bell) - 1.0
                 return np.asarray(np.maximum(mirrored, 0.0))
 
-            up = below(boxes[:, 5]) - below(boxes[:, 4])
-            taken[..., k] = np.where(valid, across * up, 0.0)
+            high_share = below(boxes[:, 5]) - below(boxes[:, 4])
+            taken[..., k] = np.where(valid, across * high_share, 0.0)
         return cls(taken, d1, d2, thickness)
 
     def row(self, members: IntArray, indices: IntArray) -> Row:
@@ -160,7 +164,7 @@ def numbers_between(row: Row, charge: FloatArray) -> FloatArray:
 
     Args:
         row: The row.
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
     """
     return np.column_stack(
         [
@@ -168,7 +172,7 @@ def numbers_between(row: Row, charge: FloatArray) -> FloatArray:
             np.log(row.from_charge),
             np.log(row.from_bay),
             np.sqrt(row.thickness),
-            np.full(len(row.taken), charge[2]),
+            np.broadcast_to(charge[..., 2], len(row.taken)),
         ]
     )
 

@@ -72,7 +72,7 @@ def _reflected(
 
     Args:
         faces: The walls.
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge for each bay, m/kg^(1/3) (bays, 3).
         bays: Middles of the bays (bays, 3).
 
     Returns:
@@ -82,13 +82,13 @@ def _reflected(
     from scipy.special import ndtr  # takes a while to import
 
     # (1) Walls that face the charge, and bays before them.
-    before_charge = faces.outward * (charge[faces.axis] - faces.at)
+    before_charge = faces.outward * (charge[:, faces.axis] - faces.at)
     before_bay = faces.outward * (bays[:, faces.axis] - faces.at)
     valid = (before_charge > _CLEAR) & (before_bay > _CLEAR)
     # (2) The image, where its way crosses the wall, and the share of the bell on the wall.
-    image = np.broadcast_to(charge, (len(bays), len(faces.at), 3)).copy()
+    image = np.repeat(charge[:, np.newaxis], len(faces.at), axis=1)
     index = np.arange(len(faces.at))
-    image[:, index, faces.axis] = 2.0 * faces.at - charge[faces.axis]
+    image[:, index, faces.axis] = 2.0 * faces.at - charge[:, faces.axis]
     ways = image - bays[:, np.newaxis]
     longer = np.linalg.norm(ways, axis=2)
     total = np.maximum(before_charge + before_bay, _LEAST)
@@ -118,12 +118,13 @@ def numbers_of_echoes(
     """Return the numbers of the law of echoes (bays, numbers), see `NUMBERS`.
 
     Args:
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
         bays: Middles of the bays (bays, 3).
         normal: Outward normal of their wall (3,).
         boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
         high: Height of the building of each bay (bays,).
     """
+    charge = np.broadcast_to(charge, bays.shape)
     way = charge - bays
     distance = np.maximum(np.linalg.norm(way, axis=1), _LEAST)
     cosine = way @ normal / distance
@@ -158,7 +159,7 @@ def numbers_of_echoes(
             np.log(distance),
             cosine,
             bays[:, 2],
-            np.full(len(bays), charge[2]),
+            charge[:, 2],
             high,
         ]
     )

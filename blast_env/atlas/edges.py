@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas.laws import Factors, Law
 
 NUMBERS: Final[Sequence[str]] = (
@@ -43,7 +43,7 @@ def numbers_of_edges(
     """Return the numbers of the law of edges (bays, numbers), see `NUMBERS`.
 
     Args:
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
         bays: Middles of the bays of one wall (bays, 3).
         normal: Its outward normal (3,).
         ends: Distances of each bay from both ends of the wall (bays, 2).
@@ -62,7 +62,7 @@ def numbers_of_edges(
             np.sqrt(far),
             np.sqrt(np.maximum(high - bays[:, 2], 0.0)),
             bays[:, 2],
-            np.full(len(bays), charge[2]),
+            np.broadcast_to(charge[..., 2], len(bays)),
         ]
     )
 
@@ -89,7 +89,7 @@ def factors_of_edges(law: Law, numbers: FloatArray) -> Factors:
     return Factors(middle, low, high, found.in_range)
 
 
-def is_against(law: Law, numbers: FloatArray) -> bool:
-    """Return whether the charge is nearer to the wall than the law knows."""
+def is_against(law: Law, numbers: FloatArray) -> BoolArray:
+    """Return whether the charge is nearer to the wall than the law knows (bays,)."""
     column = NUMBERS.index("ln_charge_to_wall")
-    return bool((numbers[:, column] < law.least[column] - 1e-6).any())
+    return np.asarray(numbers[:, column] < law.least[column] - 1e-6)

@@ -7,7 +7,7 @@ blasts of gas dynamics and are in `data/laws.json`, which `python -m studies.atl
 
 import json
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from typing import Annotated, Final, NamedTuple
 
@@ -82,6 +82,14 @@ class Factors(NamedTuple):
             self.in_range & other.in_range,
         )
 
+    def where_in_range(self, other: "Factors") -> "Factors":
+        """Return these where the law knows the surroundings, others elsewhere."""
+        known = self.in_range[:, np.newaxis]
+        middle, low, high = (
+            np.where(known, own, more) for own, more in zip(self[:3], other[:3], strict=True)
+        )
+        return Factors(middle, low, high, self.in_range | other.in_range)
+
     def where_known(self) -> "Factors":
         """Return the same, with 1 where the law does not know the surroundings."""
         known = self.in_range[:, np.newaxis]
@@ -148,40 +156,67 @@ class Law(BaseModel):
     above: tuple[float, float]
     families: Mapping[str, FamilyError]
 
+    @cached_property
+    def _arrays(self) -> "_Arrays":
+        """The coefficients as arrays: a law is asked thousands of times for a site."""
+        return _Arrays(*(np.array(getattr(self, name)) for name in _Arrays._fields))
+
     def gate(self, numbers: FloatArray) -> FloatArray:
         """Return how much of an obstacle there is, 0 for none (bays,)."""
-        return np.asarray(np.clip(numbers @ np.array(self.gates), 0.0, 2.0))
+        return np.asarray((numbers @ self._arrays.gates).clip(0.0, 2.0))
 
     def width(self, numbers: FloatArray) -> FloatArray:
         """Return the width of intervals, in units of their ends: 0 without an obstacle (bays,)."""
-        return np.asarray(np.sqrt(self.gate(numbers)) * (1.0 + numbers @ np.array(self.widths)))
+        return self._width(numbers, self.gate(numbers))
 
     def log_factors(self, numbers: FloatArray) -> FloatArray:
         """Return the logarithms of the factors, in range or not (bays, loads)."""
-        hidden = np.tanh(
-            ((numbers - np.array(self.centre)) / np.array(self.scale)) @ np.array(self.inner)
-            + np.array(self.inner_shift)
-        )
-        net = hidden @ np.array(self.outer) + np.array(self.outer_shift)
-        return np.asarray(self.gate(numbers)[:, np.newaxis] * net)
+        return self._log_factors(numbers, self.gate(numbers))
 
     def in_range(self, numbers: FloatArray) -> BoolArray:
         """Return whether all numbers lie between those of the blasts (bays,)."""
-        low, high = np.array(self.least) - _BEYOND, np.array(self.most) + _BEYOND
-        inside = ((numbers >= low) & (numbers <= high)).all(axis=1)
-        return np.asarray(inside | (self.gate(numbers) < _SMALL))
+        own = self._arrays
+        inside = (numbers >= own.least - _BEYOND) & (numbers <= own.most + _BEYOND)
+        return np.asarray(inside.all(axis=1) | (self.gate(numbers) < _SMALL))
 
     def factors(self, numbers: FloatArray) -> Factors:
         """Return the factors on the loads of bays, given their numbers (bays, numbers).
 
         Outside the range they are those of the nearest numbers in it.
         """
+        own = self._arrays
         inside = self.in_range(numbers)
-        numbers = np.clip(numbers, np.array(self.least), np.array(self.most))
-        middle = self.log_factors(numbers)
-        width = self.width(numbers)[:, np.newaxis]
-        low, high = middle - width * np.array(self.below), middle + width * np.array(self.above)
+        numbers = np.minimum(np.maximum(numbers, own.least), own.most)
+        gate = self.gate(numbers)
+        middle = self._log_factors(numbers, gate)
+        width = self._width(numbers, gate)[:, np.newaxis]
+        low, high = middle - width * own.below, middle + width * own.above
         return Factors(np.exp(middle), np.exp(low), np.exp(high), inside)
+
+    def _width(self, numbers: FloatArray, gate: FloatArray) -> FloatArray:
+        return np.asarray(np.sqrt(gate) * (1.0 + numbers @ self._arrays.widths))
+
+    def _log_factors(self, numbers: FloatArray, gate: FloatArray) -> FloatArray:
+        own = self._arrays
+        hidden = np.tanh(((numbers - own.centre) / own.scale) @ own.inner + own.inner_shift)
+        return np.asarray(gate[:, np.newaxis] * (hidden @ own.outer + own.outer_shift))
+
+
+class _Arrays(NamedTuple):
+    """Coefficients of a law."""
+
+    gates: FloatArray
+    widths: FloatArray
+    least: FloatArray
+    most: FloatArray
+    centre: FloatArray
+    scale: FloatArray
+    inner: FloatArray
+    inner_shift: FloatArray
+    outer: FloatArray
+    outer_shift: FloatArray
+    below: FloatArray
+    above: FloatArray
 
 
 class Laws(BaseModel):

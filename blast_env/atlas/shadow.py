@@ -32,15 +32,16 @@ def numbers_of_shadow(
     """Return the numbers of the law of shadows (bays, numbers), see `NUMBERS`.
 
     Args:
-        charge: Place of the charge, m/kg^(1/3) (3,).
+        charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
         bays: Middles of the bays (bays, 3).
         normals: Their outward normals (bays, 3).
         box: Low x, y, high x, y, base and top of the building (6,).
     """
+    charge = np.broadcast_to(charge, bays.shape)
     way = charge - bays
     distance = np.maximum(np.linalg.norm(way, axis=1), _LEAST)
     corners = np.array([[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]])
-    to_charge = np.linalg.norm(corners - charge[:2], axis=1)
+    to_charge = np.linalg.norm(corners - charge[:, np.newaxis, :2], axis=2)
     to_bays = np.linalg.norm(corners[np.newaxis] - bays[:, np.newaxis, :2], axis=2)
     # Round the nearest end of the bay's own wall.
     along = np.column_stack([-normals[:, 1], normals[:, 0]])

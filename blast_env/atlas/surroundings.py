@@ -7,6 +7,7 @@ it.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -20,6 +21,9 @@ from blast_env.site.blast_site import BlastSite
 
 _NOTICED: Final = 0.02
 """Change of a load from which surroundings have a name in the answer."""
+
+_AT_ONCE: Final = 200_000
+"""Pairs of bays and boxes that are looked at together."""
 
 BARRIER: Final = "barrier"
 """In the place of the structure's name, for pieces of a layout."""
@@ -89,33 +93,42 @@ class Walls:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """What surrounds the bays of a site for one place of a charge.
+class PlaceFactors:
+    """Factors on the loads of the curves, for bays and one or several places of a charge.
 
     Attributes:
-        edges: Factors on the loads of the curves, in the open: for the edges of the wall and the
-            angle of the wave. 1 for walls that face away.
-        factors: Factors on those loads for what stands around.
+        edges: For the edges of the wall and the angle of the wave, in the open; 1 for walls that
+            face away.
+        factors: For what stands around, on top of these.
         faces: Whether each bay faces the charge (bays,).
-        words: What each bay has, with the name of the obstacle; empty in the open.
-        unknown: What each bay has outside the range of the laws; empty if nothing.
     """
 
     edges: Factors
     factors: Factors
     faces: BoolArray
-    words: tuple[str, ...]
-    unknown: tuple[str, ...]
 
     @property
     def likely(self) -> FloatArray:
-        """Best estimates of the factors (bays, 2)."""
+        """Best estimates of the factors (bays, 2), of impulses and peaks."""
         return self.edges.middle * self.factors.middle
 
     @property
     def counted(self) -> FloatArray:
         """Factors for the loads (bays, 2), of impulses and peaks."""
         return self.edges.times(self.factors).counted
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings(PlaceFactors):
+    """What surrounds the bays of a site for one place of a charge.
+
+    Attributes:
+        words: What each bay has, with the name of the obstacle; empty in the open.
+        unknown: What each bay has outside the range of the laws; empty if nothing.
+    """
+
+    words: tuple[str, ...]
+    unknown: tuple[str, ...]
 
 
 class SiteAtlas:
@@ -134,53 +147,80 @@ class SiteAtlas:
         self._laws = packaged_laws() if known is None else known
 
     def around(self, charge_m: tuple[float, float, float], scale: float) -> Surroundings:
-        """Return the surroundings of all bays.
+        """Return the surroundings of all bays, with their names.
 
         Args:
             charge_m: Place of the charge.
             scale: Cube root of its mass, kg^(1/3).
         """
-        walls, count = self._walls, len(self._walls.middles_m)
-        charge = np.array(charge_m) / scale
-        solid = replace(self._solid, boxes=self._solid.boxes / scale)
-        own_edges, factors = _ones(count), _ones(count)
-        words, unknown = [""] * count, [""] * count
-        faces = np.zeros(count, dtype=bool)
-        for bays in self._groups:
-            wall = _Wall(
-                charge,
-                walls.middles_m[bays] / scale,
-                walls.normals[bays[0]],
-                walls.high_m[bays] / scale,
-                walls.ends_m[bays] / scale,
-            )
-            before = float(walls.before_m[bays[0]]) / scale
-            if float((charge - wall.middles[0]) @ wall.normal) > -before:
-                faces[bays] = True
-                own = self._facing(wall, solid)
-            else:
-                own = self._away(wall, solid, walls.structures[bays[0]])
-            for whole, part in ((own_edges, own.edges), (factors, own.factors)):
-                for target, values in zip(whole, part, strict=True):
-                    target[bays] = values
-            for index, name, missing in zip(bays.tolist(), own.words, own.unknown, strict=True):
-                words[index], unknown[index] = name, missing
-        return Surroundings(own_edges, factors, faces, tuple(words), tuple(unknown))
+        found, notes = self._found(np.array([charge_m]) / scale, scale)
+        words, unknown = [""] * len(found.faces), [""] * len(found.faces)
+        for rows, note in notes:
+            _add(words, rows[note.counts & note.in_range], note.name)
+            _add(unknown, rows[~note.in_range], note.name)
+        return Surroundings(found.edges, found.factors, found.faces, tuple(words), tuple(unknown))
 
-    def _edges(self, wall: "_Wall") -> tuple[Factors, str]:
-        """Return what the edges of a wall do, and a word if the charge is too near to it."""
-        law = self._laws.edges
-        numbers = edges.numbers_of_edges(
-            wall.charge, wall.middles, wall.normal, wall.ends, wall.high
+    def at(self, charges_m: FloatArray, scale: float) -> PlaceFactors:
+        """Return the factors for many places of a charge, of all bays (places * bays, ...).
+
+        Args:
+            charges_m: The places (places, 3).
+            scale: Cube root of the mass, kg^(1/3).
+        """
+        charges = np.asarray(charges_m) / scale
+        each_place = max(len(self._walls.middles_m) * len(self._solid.boxes), 1)
+        several = max(_AT_ONCE // each_place, 1)
+        found = [
+            self._found(charges[start : start + several], scale)[0]
+            for start in range(0, len(charges), several)
+        ]
+        return PlaceFactors(
+            *(_joined([getattr(own, name) for own in found]) for name in ("edges", "factors")),
+            np.concatenate([own.faces for own in found]),
         )
-        near = "a charge that stands against the wall" if edges.is_against(law, numbers) else ""
-        return edges.factors_of_edges(law, numbers), near
 
-    def _facing(self, wall: "_Wall", solid: Solid) -> Surroundings:
+    def _found(
+        self, charges: FloatArray, scale: float
+    ) -> tuple[PlaceFactors, list[tuple[IntArray, "_Note"]]]:
+        """Return the factors for places of a charge, and what they come from, by their rows."""
+        walls, count = self._walls, len(self._walls.middles_m)
+        solid = replace(self._solid, boxes=self._solid.boxes / scale)
+        own_edges, factors = _ones(len(charges) * count), _ones(len(charges) * count)
+        faces, notes = np.zeros(len(charges) * count, dtype=bool), []
+        for bays in self._groups:
+            middles, normal = walls.middles_m[bays] / scale, walls.normals[bays[0]]
+            before = float(walls.before_m[bays[0]]) / scale
+            facing = (charges - middles[0]) @ normal > -before
+            for is_facing in (True, False):
+                places = np.flatnonzero(facing == is_facing)
+                if not len(places):
+                    continue
+                rows = (places[:, np.newaxis] * count + bays).ravel()
+                times = len(places)
+                wall = _Wall(
+                    np.repeat(charges[places], len(bays), axis=0),
+                    np.tile(middles, (times, 1)),
+                    normal,
+                    np.tile(walls.high_m[bays] / scale, times),
+                    np.tile(walls.ends_m[bays] / scale, (times, 1)),
+                )
+                if is_facing:
+                    own = self._facing(wall, solid)
+                else:
+                    own = self._away(wall, solid, walls.structures[bays[0]])
+                faces[rows] = is_facing
+                for whole, part in ((own_edges, own.edges), (factors, own.factors)):
+                    for target, values in zip(whole, part, strict=True):
+                        target[rows] = values
+                notes += [(rows, note) for note in own.notes]
+        return PlaceFactors(own_edges, factors, faces), notes
+
+    def _facing(self, wall: "_Wall", solid: Solid) -> "_Around":
         """Return what shields a wall that faces the charge, and what throws waves back on it."""
         count = len(wall.middles)
-        (own_edges, near), every = self._edges(wall), np.ones(count, dtype=bool)
-        factors, words, unknown = Factors.none(count), [""] * count, [near] * count
+        every = np.ones(count, dtype=bool)
+        own_edges, near = self._edges(wall)
+        factors, notes = Factors.none(count), [near]
         governing: list[tuple[Factors, str]] = []
         for row in between.rows_between(wall.charge, wall.middles, wall.normal, solid.boxes):
             own = self._laws.between.factors(between.numbers_between(row, wall.charge))
@@ -189,33 +229,44 @@ class SiteAtlas:
             factors = factors.least(own.where_known())
         for own, name in governing:
             counts = own.middle[:, 0] <= factors.middle[:, 0]  # the row that takes most
-            _note(words, unknown, name, own, counts)
-        # Pieces throw the wave back like fronts: a row behind a charge, or beside a bay.
-        boxes = solid.boxes[between.lies_before(wall.middles, wall.normal, solid.boxes)]
-        if not len(boxes):
-            return Surroundings(own_edges, factors, every, tuple(words), tuple(unknown))
-        numbers = echoes.numbers_of_echoes(wall.charge, wall.middles, wall.normal, boxes, wall.high)
+            notes.append(_Note.of(name, own, counts))
+        before = between.lies_before(wall.middles, wall.normal, solid.boxes)
+        buildings, fronts = (
+            echoes.numbers_of_echoes(wall.charge, wall.middles, wall.normal, boxes, wall.high)
+            for boxes in (solid.boxes[before & solid.is_building], solid.boxes[before])
+        )
         for law, name in (
             (self._laws.opposite, "a front opposite"),
             (self._laws.beside, "walls beside"),
         ):
-            if law.gate(numbers).max() == 0.0:
+            if law.gate(fronts).max() == 0.0:
                 continue
-            own = law.factors(numbers)
-            _note(words, unknown, name, own, every)
+            # Pieces throw the wave back as well, as far as the law knows such fronts.
+            own = law.factors(fronts).where_in_range(law.factors(buildings))
+            notes.append(_Note.of(name, own, every))
             factors = factors.times(own)
-        return Surroundings(own_edges, factors, every, tuple(words), tuple(unknown))
+        return _Around(own_edges, factors, notes)
 
-    def _away(self, wall: "_Wall", solid: Solid, structure: str) -> Surroundings:
+    def _edges(self, wall: "_Wall") -> tuple[Factors, "_Note"]:
+        """Return what the edges of a wall do, and a note if the charge is too near to it."""
+        law = self._laws.edges
+        numbers = edges.numbers_of_edges(
+            wall.charge, wall.middles, wall.normal, wall.ends, wall.high
+        )
+        against = edges.is_against(law, numbers)
+        note = _Note("a charge that stands against the wall", ~against, np.zeros_like(against))
+        return edges.factors_of_edges(law, numbers), note
+
+    def _away(self, wall: "_Wall", solid: Solid, structure: str) -> "_Around":
         """Return the shadow on a wall of a rectangular building that faces away.
 
         The law is of buildings that stand alone: one behind throws the wave back into the shadow.
         """
         count = len(wall.middles)
         own = [index for index, name in enumerate(solid.structures) if name == structure]
-        alone, hidden, nothing = Factors.none(count), np.zeros(count, dtype=bool), ("",) * count
+        alone = Factors.none(count)
         if len(own) != 1:
-            return Surroundings(alone, alone, hidden, nothing, nothing)
+            return _Around(alone, alone, [])
         box = solid.boxes[own[0]]
         normals = np.broadcast_to(wall.normal, (count, 3))
         numbers = shadow.numbers_of_shadow(wall.charge, wall.middles, normals, box)
@@ -225,10 +276,8 @@ class SiteAtlas:
         if between.lies_before(wall.middles, wall.normal, solid.boxes[others]).any():
             factors = factors._replace(in_range=np.zeros(count, dtype=bool))
             name = f"{name}, with another behind that may add load"
-        words, unknown = [""] * count, [""] * count
-        every = np.ones(count, dtype=bool)
-        _note(words, unknown, name, factors, every)
-        return Surroundings(alone, factors.where_known(), hidden, tuple(words), tuple(unknown))
+        note = _Note.of(name, factors, np.ones(count, dtype=bool))
+        return _Around(alone, factors.where_known(), [note])
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,15 +293,39 @@ class _Wall:
 
 def _ones(bays: int) -> Factors:
     """Return factors of 1 in arrays of their own, to be filled."""
-    return Factors(*(own.copy() for own in Factors.none(bays)))
+    one = Factors.none(bays)
+    return Factors(one.middle.copy(), one.low.copy(), one.high.copy(), one.in_range.copy())
 
 
-def _note(
-    words: list[str], unknown: list[str], name: str, factors: Factors, counts: BoolArray
-) -> None:
-    """Add the name of an obstacle to the bays that it changes, or to those outside its range."""
-    changed = np.abs(np.log(factors.middle)).max(axis=1) > _NOTICED
-    for index in np.flatnonzero(changed & factors.in_range & counts).tolist():
-        words[index] = f"{words[index]}, {name}" if words[index] else name
-    for index in np.flatnonzero(changed & ~factors.in_range).tolist():
-        unknown[index] = f"{unknown[index]}, {name}" if unknown[index] else name
+def _joined(parts: Sequence[Factors]) -> Factors:
+    middle, low, high, in_range = (np.concatenate(own) for own in zip(*parts, strict=True))
+    return Factors(middle, low, high, in_range)
+
+
+@dataclass(frozen=True, eq=False)
+class _Note:
+    """The name of what stands around, and which bays it changes in range, or outside it."""
+
+    name: str
+    in_range: BoolArray
+    counts: BoolArray
+
+    @classmethod
+    def of(cls, name: str, factors: Factors, counts: BoolArray) -> "_Note":
+        """Return the note on factors; those that change nothing are in range, and do not count."""
+        changed = np.abs(np.log(factors.middle)).max(axis=1) > _NOTICED
+        return cls(name, factors.in_range | ~changed, changed & counts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """What is around the bays of one wall."""
+
+    edges: Factors
+    factors: Factors
+    notes: list[_Note]
+
+
+def _add(texts: list[str], rows: IntArray, name: str) -> None:
+    for index in rows.tolist():
+        texts[index] = f"{texts[index]}, {name}" if texts[index] else name

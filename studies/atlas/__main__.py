@@ -209,24 +209,42 @@ def sites(
             for has_layout in (False, True)
             for own in on_site(site, has_layout, packaged_laws(), clipping, out)
         ]
-        headers = ("site", "layout", "bays", "impulse, error of ln", "peak, error of ln")
-        more = ("gas over screening, impulse", "peak")
+        headers = ("site", "layout", "bays", "estimate of impulse, error of ln")
+        more = ("impulse", "peak", "gas over screening, impulse", "peak")
         print_line(markdown_table((*headers, *more), findings.site_rows(found)))
 
 
 @app.command()
-def picture(
-    data: Data = DATA,
-    out: Annotated[Path, typer.Option(help="The picture, .png.")] = Path("out/atlas.png"),
+def cities(
+    cell: Annotated[float, typer.Option(help="Side of the cells of gas dynamics, m.")] = 0.5,
+    most: Annotated[float, typer.Option(help="Farthest place along the street, m.")] = 36.0,
 ) -> None:
-    """Draw the laws beside the blasts, one panel per family."""
-    from studies.atlas.pictures import family_picture
+    """Compare peaks along streets of cities of equal blocks with those that others computed."""
+    from studies.atlas.cities import rows as city_rows
 
     with user_errors():
-        make_folder(out.parent)
-        figure = family_picture(_scenes(_read(data)), packaged_laws())
-        figure.savefig(out, dpi=100)
-        print_line(f"wrote {out}")
+        headers = ("city", "charge", "streets", "peak over open ground, theirs", "gas dynamics")
+        print_line(markdown_table((*headers, "ratio"), city_rows(cell, most)))
+
+
+@app.command()
+def pictures(
+    family: Annotated[list[str] | None, typer.Option(help="Families; default: all.")] = None,
+    data: Data = DATA,
+    out: Annotated[Path, typer.Option(help="Folder of the pictures.")] = Path("out"),
+) -> None:
+    """Draw one picture per family: the blasts by design, and the law beside them."""
+    from studies.atlas.pictures import SHOWN, family_picture
+
+    with user_errors():
+        make_folder(out)
+        groups = _groups(_read(data))
+        for name in family or SHOWN:
+            if name not in SHOWN:
+                raise UnknownNameError("family", name, SHOWN)
+            file = out / f"atlas_{name}.png"
+            family_picture(name, groups, packaged_laws()).savefig(file, dpi=80)
+            print_line(f"wrote {file}")
 
 
 def _read(data: Path) -> pd.DataFrame:

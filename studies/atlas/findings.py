@@ -183,10 +183,12 @@ def _site_row(name: str, layout: str, parts: Sequence[SiteLoads]) -> Row:
         off = np.log(np.concatenate(loads) / gas)
         cells.append((np.sqrt((off**2).mean(axis=0)), np.exp(-off).max(axis=0)))
     (before, low_before), (after, low_after) = cells
+    likely = np.log(np.concatenate([own.likely for own in parts]) / gas[:, 0])
     return (
         name,
         layout,
         str(len(gas)),
+        f"{np.sqrt((likely**2).mean()):.2f}",
         *(f"{a:.2f} -> {b:.2f}" for a, b in zip(before, after, strict=True)),
         *(f"{a:.2f} -> {b:.2f}" for a, b in zip(low_before, low_after, strict=True)),
     )

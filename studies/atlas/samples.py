@@ -135,7 +135,7 @@ def curves_at(bays: Bays, facing: bool) -> FloatArray:
         bays: The bays.
         facing: Whether walls that face the charge reflect; else all loads are side-on.
     """
-    seen = np.full(len(bays.middles), facing) & ~_away(bays)
+    seen = np.full(len(bays.middles), facing) & ~away_from(bays)
     x_m, y_m, z_m = (CUBE_ROOT * bays.charge).tolist()
     ways = Ways.between((x_m, y_m, z_m), CUBE_ROOT * bays.middles, bays.normals, seen)
     impulse, peak = (
@@ -144,7 +144,7 @@ def curves_at(bays: Bays, facing: bool) -> FloatArray:
     return np.column_stack([impulse / CUBE_ROOT, peak])
 
 
-def _away(bays: Bays) -> BoolArray:
+def away_from(bays: Bays) -> BoolArray:
     """Return whether bays lie on walls that face away from the charge (bays,)."""
     return np.asarray(((bays.charge - bays.middles) * bays.normals).sum(axis=1) < 0.0)
 
@@ -222,7 +222,7 @@ def samples_echoes(bays: Bays) -> tuple[FloatArray, BoolArray]:
 def samples_shadow(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of shadows, of walls that face away."""
     found = numbers_of_shadow(bays.charge, bays.middles, bays.normals, bays.judged)
-    return found, _away(bays)
+    return found, away_from(bays)
 
 
 def samples_edges(bays: Bays) -> tuple[FloatArray, BoolArray]:

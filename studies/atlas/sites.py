@@ -45,6 +45,7 @@ class SiteLoads:
             same cells on a wall in the open, at the bay's distance and angle (bays, 2).
         without: Those by screening without the atlas.
         atlas: Those with it.
+        likely: Impulses by its best estimates (bays,).
     """
 
     site: str
@@ -53,6 +54,7 @@ class SiteLoads:
     gas: FloatArray
     without: FloatArray
     atlas: FloatArray
+    likely: FloatArray
 
 
 def on_site(
@@ -87,6 +89,7 @@ def on_site(
                 np.array([by_gas[bay.filled.bay.name] for bay, _ in chosen]),
                 np.array([(bay.impulse_pa_s, bay.peak_pa) for _, bay in chosen]),
                 np.array([(bay.impulse_pa_s, bay.peak_pa) for bay, _ in chosen]),
+                np.array([bay.likely_pa_s for bay, _ in chosen]),
             )
 
 

@@ -7,11 +7,12 @@ import pytest
 
 from blast_env.answers import Line
 from blast_env.answers.screening import screening_answer
-from blast_env.atlas import packaged_laws
+from blast_env.atlas import SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
 from blast_env.layout import load_layout
+from blast_env.layout.build_site import build_site
 from blast_env.response import (
     Bay,
     FacadeBay,
@@ -297,3 +298,23 @@ def test_a_charge_against_a_wall_counts_up_to_twice_its_mass_and_says_so() -> No
     for bay, other in far:
         assert 1.2 < bay.impulse_pa_s / other.impulse_pa_s < 1.7
         assert "a charge that stands against the wall" in bay.unknown
+
+
+def test_many_places_have_the_factors_of_each_place() -> None:
+    site = walled_yard()
+    facade = build_site(site, ())
+    middles = np.array([[29.5, 16.0, 1.75], [29.5, 22.0, 1.75], [36.0, 26.0, 1.75]])
+    normals = np.array([[-1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    walls = Walls(middles, normals, ("office",) * 3, np.full(3, 3.5), np.full((3, 2), 4.0),
+                  np.zeros(3))  # fmt: skip
+    atlas, places_m = (
+        SiteAtlas(facade, walls),
+        np.array([[10.0, y, 0.5] for y in (5.0, 20.0, 38.0)]),
+    )
+    together = atlas.at(places_m, 4.6)
+    one_by_one = [atlas.around(tuple(place), 4.6) for place in places_m.tolist()]
+    for name in ("counted", "likely", "faces"):
+        expected = np.concatenate([getattr(own, name) for own in one_by_one])
+        assert getattr(together, name) == pytest.approx(expected, rel=1e-12)
+    assert not together.faces.all()
+    assert together.factors.middle.min() < 0.9

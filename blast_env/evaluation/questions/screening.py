@@ -533,19 +533,18 @@ def _screened(
 ) -> ThreatScreening:
     """Return the place of a threat with the worst level, then the largest sum of damage."""
     _, tnt_kg, height_m = places[0]
-    around: list[Surroundings] = []
-    seen = ways
+    seen, around = ways, None
     if atlas is not None:
-        scale = float(np.cbrt(tnt_kg))
-        around = [atlas.around((*own.position_m, own.height_m), scale) for own in places]
+        charges_m = np.array([(*own.position_m, own.height_m) for own in places])
+        around = atlas.at(charges_m, float(np.cbrt(tnt_kg)))
         # What hides a bay that faces the charge is in the factors; outside the atlas's range it
         # takes nothing off.
-        seen = ways._replace(seen=np.stack([own.faces for own in around]))
+        seen = ways._replace(seen=around.faces.reshape(ways.away_m.shape))
     peaks, impulses = (in_the_open(part, seen, tnt_kg, height_m) for part in _LOADS)
     likely = impulses
-    if around:
-        likely = impulses * np.stack([own.likely[:, 0] for own in around])
-        factors = np.stack([own.counted for own in around])
+    if around is not None:
+        likely = impulses * around.likely[:, 0].reshape(impulses.shape)
+        factors = around.counted.reshape((*impulses.shape, 2))
         impulses, peaks = impulses * factors[..., 0], peaks * factors[..., 1]
     numbers, parts = facade.kinds
     damage = np.zeros(peaks.shape)
@@ -554,6 +553,7 @@ def _screened(
         damage[:, which] = _tabulated(own_parts, peaks[:, which], impulses[:, which])
     order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
+    own = _named(atlas, places[worst])
     bays = []
     for index, filled in enumerate(facade.bays):
         load = float(peaks[worst, index]), float(impulses[worst, index])
@@ -561,8 +561,7 @@ def _screened(
         away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
         found = BayScreening(filled, float(away_m), bool(is_seen), *load, response)
         found = replace(found, likely_pa_s=float(likely[worst, index]))
-        if around:
-            own = around[worst]
+        if own is not None:
             middle, low, high = (float(part[index, 0]) for part in own.factors[:3])
             found = replace(
                 found,
@@ -573,6 +572,13 @@ def _screened(
             )
         bays.append(found)
     return ThreatScreening(name, places[worst], len(places), tuple(bays))
+
+
+def _named(atlas: SiteAtlas | None, place: Charge) -> Surroundings | None:
+    """Return what surrounds the bays for one place, with names; `None` without an atlas."""
+    if atlas is None:
+        return None
+    return atlas.around((*place.position_m, place.height_m), float(np.cbrt(place.tnt_kg)))
 
 
 def _tabulated(
