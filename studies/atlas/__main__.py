@@ -215,6 +215,20 @@ def sites(
 
 
 @app.command()
+def thumb(
+    name: Annotated[list[str] | None, typer.Argument(help="Bundled sites.")] = None,
+) -> None:
+    """Compare rules of thumb by the atlas with gas dynamics; print which have the word."""
+    from studies.atlas.thumb import SITES as WITH_RULES
+    from studies.atlas.thumb import rows as thumb_rows
+
+    with user_errors():
+        rows = [row for site in name or WITH_RULES for row in thumb_rows(site)]
+        headers = ("site", "rule", "left by the atlas", "left by gas dynamics", "word")
+        print_line(markdown_table(headers, rows))
+
+
+@app.command()
 def cities(
     cell: Annotated[float, typer.Option(help="Side of the cells of gas dynamics, m.")] = 0.5,
     most: Annotated[float, typer.Option(help="Farthest place along the street, m.")] = 36.0,
