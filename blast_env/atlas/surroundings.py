@@ -175,7 +175,8 @@ class SiteAtlas:
             for start in range(0, len(charges), several)
         ]
         return PlaceFactors(
-            *(_joined([getattr(own, name) for own in found]) for name in ("edges", "factors")),
+            _joined([own.edges for own in found]),
+            _joined([own.factors for own in found]),
             np.concatenate([own.faces for own in found]),
         )
 

@@ -400,6 +400,6 @@ def test_pieces_keep_off_all_places_where_a_known_charge_may_be() -> None:
 def test_a_rule_that_makes_a_site_worse_comes_with_the_word(rule: str, worse: bool) -> None:
     """By gas dynamics the first two of hotel_forecourt add 9 %, the third takes off 56 %."""
     problem = problem_of("hotel_forecourt", None)
-    found = find_proposer(rule).propose(problem)
+    found = find_proposer(rule).propose(problem, 0)
     assert found.layout
     assert (found.by == WORSE) == worse
