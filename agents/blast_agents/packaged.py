@@ -23,7 +23,7 @@ from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, case_for, improved
-from blast_env.design.search.package import proposed
+from blast_env.design.search.package import LEAST_GAIN, proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
@@ -173,7 +173,7 @@ class PackagedAgent:
         return digest.hexdigest()[:16]
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
-        """Return the best guess among the policy's layout, the rules' ones and none.
+        """Return the first of the policy's layout, the rules' ones and none, as `ranked` has them.
 
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
@@ -214,8 +214,10 @@ class PackagedAgent:
     ) -> tuple[Layout, ...]:
         """Return the layouts of policy and rules, draws, none and changes, the best guess first.
 
-        Changes are of the best guesses so far, as in a search by guesses alone. Each layout is
-        sorted, and there once.
+        Changes are of the best guesses so far, as in a search by guesses alone. The more layouts
+        are looked at, the more the best guess owes to its error. So the best of the rules' layouts
+        and none stays in front of another one that does not promise `LEAST_GAIN` of the load
+        without a barrier more. Each layout is sorted, and there once.
 
         Args:
             scenario: The scenario.
@@ -232,10 +234,17 @@ class PackagedAgent:
         guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
         rules = layouts_by_rule(found, charge)
         candidates = Candidates.of(found, charge, rules)
-        layouts: list[Layout] = [(), *rules.values(), *self._layouts(candidates, 1, None)]
+        known = [(), *(tuple(sorted(layout)) for layout in rules.values())]
+        layouts = [*known, *self._layouts(candidates, 1, None)]
         if checked:
             layouts += self._layouts(candidates, checked, generator(seed))
-        return tuple(improved(guesses, layouts, most, generator(seed)))
+        ranked = improved(guesses, layouts, most, generator(seed))
+        surest = known[int(guesses.loads(known).argmin())]
+        unprotected, sure, best = guesses.loads([(), surest, ranked[0]]).tolist()
+        if best > sure - LEAST_GAIN * unprotected:
+            ranked.remove(surest)
+            ranked.insert(0, surest)
+        return tuple(ranked)
 
     def _layouts(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None

@@ -15,6 +15,7 @@ from blast_env.cli import app
 from blast_env.design import expected_charge, random_layout
 from blast_env.design.proposal import problem_of
 from blast_env.design.search import Guesses, layouts_by_rule
+from blast_env.design.search.package import LEAST_GAIN
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, LoadCaseSet
 from blast_env.layout import LayoutState, draw_threat, load_layout
@@ -63,20 +64,21 @@ def test_layouts_that_are_drawn_differ_and_the_first_one_of_the_ranked_has_the_b
     assert len(set(ranked)) == len(ranked) > 2
     guesses = guesses_of(CONTROL_ROOM, charge)
     loads = guesses.loads(ranked)
-    assert (np.diff(loads) >= 0.0).all()
-    assert loads[0] <= guesses.loads([packaged_agent().propose(CONTROL_ROOM, charge)])
+    assert (np.diff(loads[1:]) >= 0.0).all()
+    assert loads[0] <= loads[1] + LEAST_GAIN * guesses.loads([()])
     assert packaged_agent().ranked(CONTROL_ROOM, charge, 8) == ranked
 
 
-def test_a_proposal_is_behind_no_rule_and_not_behind_the_policy_by_guesses() -> None:
+def test_a_proposal_is_behind_no_rule_and_hardly_behind_the_policy_by_guesses() -> None:
     for scenario in (CONTROL_ROOM, SITES["vehicle"]):
         charge = draw_threat(scenario, 0)
         likeliest = tuple(sorted(packaged_agent().likeliest(scenario, charge)))
         others = [(), likeliest, *layouts_by_rule(scenario, charge).values()]
-        own, *loads = guesses_of(scenario, charge).loads(
+        own, bare, policy, *ruled = guesses_of(scenario, charge).loads(
             [packaged_agent().propose(scenario, charge), *others]
         )
-        assert own <= min(loads)
+        assert own <= min(bare, *ruled)
+        assert own <= policy + LEAST_GAIN * bare
 
 
 def test_it_is_better_by_guesses_than_random_layouts_on_sites_that_it_has_not_seen() -> None:
