@@ -120,7 +120,7 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     evaluator = BlastEvaluator(scenario, SHORT)
     charge = scenario.sample_charge(np.random.default_rng(0))
     case = LoadCaseSet(scenario, (LoadCase(charge),), charge=charge)
-    found = RandomSearch().propose(DesignProblem(evaluator, case), 30, 0)
+    found = RandomSearch().propose(DesignProblem(evaluator, case), 12, 0)
     assert found.layout
     assert AWAY not in found.layout
 

@@ -9,4 +9,4 @@ from blast_env.sites import generate_site
 @pytest.fixture(scope="session")
 def sites() -> tuple[Scenario, ...]:
     """The first sites."""
-    return tuple(generate_site(seed) for seed in range(80))
+    return tuple(generate_site(seed) for seed in range(40))

@@ -28,8 +28,8 @@ def test_a_site_is_worth_solving_or_has_a_fault(reduction: list[float], fault: s
 
 
 def test_the_last_site_drawn_for_a_seed_is_the_one_generated(sites: tuple[Scenario, ...]) -> None:
-    drawn = [list(drawn_sites(seed, SiteRanges())) for seed in range(8)]
-    assert [draw[-1] for draw in drawn] == list(sites[:8])
+    drawn = [list(drawn_sites(seed, SiteRanges())) for seed in range(3)]
+    assert [draw[-1] for draw in drawn] == list(sites[:3])
     assert max(map(len, drawn)) > 1
 
 
