@@ -115,8 +115,12 @@ def lead(policy: Policy, demonstration: Demonstration) -> float:
     return (best - other).min().item()
 
 
-@pytest.mark.parametrize(("observation", "count"), [("grid", 2), ("features", 1)])
-def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int) -> None:
+@pytest.mark.parametrize(
+    ("observation", "count", "updates"), [("grid", 2, 150), ("features", 1, 60)]
+)
+def test_a_policy_learns_to_place_what_it_was_shown(
+    observation: str, count: int, updates: int
+) -> None:
     """With the spatial policy a layout for each of two charges, at both ends of the area.
 
     The last steps are small, so that no choice hangs on the rounding of a matrix product.
@@ -127,7 +131,7 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
     agent = agent_for(scenario, observation)
     layouts = [by_rule(case) for case in cases]
     shown = [Demonstration(*pair, 0.4, observation) for pair in zip(cases, layouts, strict=True)]
-    chosen = warm(imitation_updates=150, learning_rate="lin_1e-2", batch_size=8)
+    chosen = warm(imitation_updates=updates, learning_rate="lin_1e-2", batch_size=8)
     loss = imitate(agent.policy, shown, chosen, np.random.default_rng(0))
     assert loss < 0.8
     for case, layout, demonstration in zip(cases, layouts, shown, strict=True):

@@ -37,7 +37,7 @@ def make(**arguments: Any) -> BlastSimulatorEnv:
 
 
 def test_both_checkers_pass_without_a_warning() -> None:
-    env = make(scenario="free_field", engine="event", step_s=0.05, render_mode="rgb_array")
+    env = make(engine="event", step_s=0.05, render_mode="rgb_array")
     check_env(env)
     check_env_for_agents(env)
 

@@ -9,6 +9,7 @@ import gymnasium as gym
 import blast_env  # noqa: F401  # registers the environments
 from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.sites import FAMILIES, SiteSource
+from tests.agents.training_runs import small_scenario as sparse_site
 from tests.envs.small import ThinEngine
 from tests.gas_sites import hut
 
@@ -34,7 +35,7 @@ def few(family: str) -> SiteSource:
 
 _CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
     {
-        "BlastSimulator-v0": {"scenario": "free_field", "engine": "event"},
+        "BlastSimulator-v0": {"scenario": sparse_site(), "engine": "event"},
         "BlastBarrierGas-v0": {"scenario": hut()},
         "BlastBarrierSites-v0": {"scenario": few(SITES), "realisations": 1, "engine": ThinEngine()},
         "BlastBarrierItemSites-v0": {
