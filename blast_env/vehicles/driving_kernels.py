@@ -51,120 +51,70 @@ def spread(
         slow_most: The largest label on an arc over slow places.
         spot_most: The largest label of a turn on the spot.
     """
+    count, rows, columns = labels.shape
     changed = labels >= np.float32(0.0)
-    spots = np.full(is_open.shape, NEVER)
+    spots = np.full((rows, columns), NEVER)
     spot_limit = np.float32(spot_most)  # in the precision of labels, else the loop would not end
     slow_limit = np.float32(slow_most)
-    arcs = np.searchsorted(of[:, 0], np.arange(len(labels) + 1))
+    arcs = np.searchsorted(of[:, 0], np.arange(count + 1))
     # Label correcting: sweep each direction along itself, so that one sweep carries a label to the
     # end of its line; then the arcs; repeat until no label grows.
     while changed.any():
-        for number in range(len(labels)):
+        for number in range(count):
             x, y = directions[number]
-            _go_straight(
-                is_open,
-                is_wide,
-                most,
-                labels,
-                changed,
-                spots,
-                spot_limit,
-                number,
-                x,
-                y,
-                lengths[number],
-            )
-            for row in range(len(is_open)):
+            for i in range(rows):
+                row = i if y >= 0 else rows - 1 - i
                 if not changed[number, row].any():
                     continue
-                for column in range(is_open.shape[1]):
+                for j in range(columns):
+                    column = j if x >= 0 else columns - 1 - j
+                    if not changed[number, row, column]:
+                        continue
+                    label = labels[number, row, column]
+                    # A turn on the spot leaves at most this run-up, in all directions.
+                    spot = min(label, spot_limit)
+                    if is_wide[row, column] and spot > spots[row, column]:
+                        spots[row, column] = spot
+                        for other in range(count):
+                            if spot > labels[other, row, column]:
+                                labels[other, row, column] = spot
+                                changed[other, row, column] = True
+                    up, right = row + y, column + x
+                    if not (0 <= up < rows and 0 <= right < columns and is_open[up, right]):
+                        continue
+                    # The run-up grows by the step, up to what the speed limit there allows.
+                    value = min(label + lengths[number], most[up, right])
+                    if value > labels[number, up, right] and _is_passed(is_open, row, column, x, y):
+                        labels[number, up, right] = value
+                        changed[number, up, right] = True
+            for row in range(rows):
+                if not changed[number, row].any():
+                    continue
+                for column in range(columns):
                     if not changed[number, row, column]:
                         continue
                     changed[number, row, column] = False
                     label = labels[number, row, column]
                     for arc in range(arcs[number], arcs[number + 1]):
+                        other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
+                        if not (0 <= up < rows and 0 <= right < columns):
+                            continue
                         # An arc bounds the speed by its lateral acceleration, hence the run-up.
                         value = min(label + arc_lengths[arc], arc_most[arc])
-                        other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
-                        if not _is_on(is_open, up, right) or value <= labels[other, up, right]:
+                        if value <= labels[other, up, right]:
                             continue
-                        track = points[first[arc] : first[arc + 1]]
-                        value = _along(track, is_open, is_slow, row, column, value, slow_limit)
+                        # Every place along the arc must be open; slow ground on it bounds the speed
+                        # at its end.
+                        for point in range(first[arc], first[arc + 1]):
+                            v, u = row + points[point, 1], column + points[point, 0]
+                            if not (0 <= v < rows and 0 <= u < columns and is_open[v, u]):
+                                value = NEVER
+                                break
+                            if is_slow[v, u]:
+                                value = min(value, slow_limit)
                         if value > labels[other, up, right]:
                             labels[other, up, right] = value
                             changed[other, up, right] = True
-
-
-@compiled()
-def _go_straight(
-    is_open: BoolArray,
-    is_wide: BoolArray,
-    most: Labels,
-    labels: Labels,
-    changed: BoolArray,
-    spots: Labels,
-    spot_limit: np.float32,
-    number: int,
-    x: int,
-    y: int,
-    length: np.float32,
-) -> None:
-    """Carry the changed labels of one direction along its step, and into turns on the spot."""
-    count, rows, columns = labels.shape
-    for i in range(rows):
-        row = i if y >= 0 else rows - 1 - i
-        if not changed[number, row].any():
-            continue
-        for j in range(columns):
-            column = j if x >= 0 else columns - 1 - j
-            if not changed[number, row, column]:
-                continue
-            label = labels[number, row, column]
-            # A turn on the spot leaves at most this run-up, in all directions.
-            spot = min(label, spot_limit)
-            if is_wide[row, column] and spot > spots[row, column]:
-                spots[row, column] = spot
-                for other in range(count):
-                    if spot > labels[other, row, column]:
-                        labels[other, row, column] = spot
-                        changed[other, row, column] = True
-            up, right = row + y, column + x
-            if not (_is_on(is_open, up, right) and is_open[up, right]):
-                continue
-            # The run-up grows by the step, up to what the speed limit there allows.
-            value = min(label + length, most[up, right])
-            if value > labels[number, up, right] and _is_passed(is_open, row, column, x, y):
-                labels[number, up, right] = value
-                changed[number, up, right] = True
-
-
-@compiled(inline="always")
-def _along(
-    track: IntArray32,
-    is_open: BoolArray,
-    is_slow: BoolArray,
-    row: int,
-    column: int,
-    value: np.float32,
-    slow_limit: np.float32,
-) -> np.float32:
-    """Return the label at the end of an arc; every place along it must be open.
-
-    Slow ground on the arc bounds the speed at its end.
-    """
-    for x, y in track:
-        up, right = row + y, column + x
-        if not (_is_on(is_open, up, right) and is_open[up, right]):
-            return NEVER
-        if is_slow[up, right]:
-            value = min(value, slow_limit)
-    return value
-
-
-@compiled(inline="always")
-def _is_on(is_open: BoolArray, row: int, column: int) -> bool:
-    """Return whether a place is on the grid."""
-    return bool(0 <= row < is_open.shape[0] and 0 <= column < is_open.shape[1])
 
 
 @compiled(inline="always")
