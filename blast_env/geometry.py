@@ -351,3 +351,7 @@ def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatAr
     outside = np.maximum(np.maximum(low - position, position - high), 0.0)
     distance: FloatArray = np.hypot(outside[:, 0], outside[:, 1])
     return distance
+
+
+Wall = Rectangle | WallLine
+"""A wall in plan; that of a rectangular structure is a rectangle of width 0."""

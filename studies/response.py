@@ -14,29 +14,18 @@ import typer
 
 from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
+from blast_env.bays import BAY_M, Bay
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.curves import normally_reflected_pa, oblique, reflected_pa
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.questions.screening import screen
-from blast_env.response.components import Glazing, catalogue
-from blast_env.response.facade import (
-    BAY_M,
-    Bay,
-    FacadeBay,
-    FacadeResponse,
-    peak_corrected,
-    peak_factor,
-    respond,
-)
+from blast_env.response.components import FacadeBay, Glazing, catalogue
+from blast_env.response.facade import FacadeResponse, peak_corrected, peak_factor, respond
 from blast_env.response.glass import Pane, glazing_responses
 from blast_env.response.sdof import Resistance, System, impulses, responses
-from blast_env.response.walls import (
-    Panel,
-    PanelResponses,
-    ReinforcedConcrete,
-    panel_responses,
-)
+from blast_env.response.wall_sections import ReinforcedConcrete
+from blast_env.response.walls import Panel, PanelResponses, panel_responses
 from blast_env.site import Scenario
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S

@@ -38,7 +38,8 @@ from blast_env.evaluation.questions.verdict import (
     side_on_peak_pa,
 )
 from blast_env.evaluation.record import BlastRecord
-from blast_env.response.buildings import BuildingDamage, LevelOfProtection
+from blast_env.response.buildings import BuildingDamage
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
 from blast_env.values import count_of

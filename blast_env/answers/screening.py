@@ -13,9 +13,9 @@ from blast_env.evaluation.questions.screening import (
 )
 from blast_env.evaluation.questions.verdict import Consequences, Verdict
 from blast_env.geometry import Layout, layout_counts
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Wall
 from blast_env.response.facade import response_words
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
 from blast_env.values import count_of

@@ -11,9 +11,9 @@ from typing import Final
 from blast_env.app import edits, placing
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.session import Session
+from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Element, Layout, Rectangle
-from blast_env.response.facade import STOREY_M
 from blast_env.sections import PointM
 from blast_env.site import Scenario, ScenarioError
 from blast_env.units import MODULE_SIDE_M

@@ -9,9 +9,9 @@ from enum import StrEnum
 from math import hypot
 from typing import Any, Final, NamedTuple
 
+from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.response.facade import STOREY_M
 from blast_env.sections import PointM
 from blast_env.site import (
     SCHEMA_VERSION,

@@ -40,7 +40,7 @@ from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 
 NO_FACADE = "Give structures windows or wall panels first (on the left)."

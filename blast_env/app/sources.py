@@ -11,9 +11,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from blast_env.app.edits import snapped
+from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutFile
-from blast_env.response.facade import STOREY_M
 from blast_env.site import SCHEMA_VERSION, Scenario, load_scenario
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from blast_env.evaluation.blasts import NO_BARRIER
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import Scenario
 from blast_env.site.sources import source_of
 

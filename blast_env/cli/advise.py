@@ -42,7 +42,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, choosing_engine, final_engine
 from blast_env.layout import write_layout
 from blast_env.provenance import versions
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import load_scenario
 
 _BudgetCostOption = Annotated[

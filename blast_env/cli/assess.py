@@ -57,7 +57,7 @@ from blast_env.evaluation.questions.verdict import (
 )
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.presets import (

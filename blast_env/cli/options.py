@@ -23,7 +23,7 @@ from blast_env.evaluation.engines.contract import (
     PAPER_ENGINES,
     Engine,
 )
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.sections import PointM
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.values import plain_number, printable

@@ -28,7 +28,7 @@ from blast_env.cli.output import (
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.layout import check_layout, load_layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.values import plain_number

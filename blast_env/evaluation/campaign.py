@@ -157,7 +157,7 @@ def _falling(scenario: Scenario, layout: Layout, record: BlastRecord) -> Layout:
     zone = scenario.zone
     # A blast has its pieces in order, whatever the order in the layout.
     ordered = sorted(load_relevant(layout))
-    bodies = [element for element in ordered if zone.rigid_piece(element) is not None]
+    bodies = [element for element in ordered if zone.catalogue.variant(element).height_m]
     falls = record.pieces["falls_in_blast"].tolist()
     return tuple(body for body, is_falling in zip(bodies, falls, strict=True) if is_falling)
 

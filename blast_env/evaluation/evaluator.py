@@ -32,7 +32,7 @@ from blast_env.layout import LayoutState, check_layout
 from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import Charge

@@ -23,8 +23,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.validation import UNSTATED, Validation, worst_validation
 from blast_env.geometry import Layout, WallName
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.damage import BayDamage, level_of, worst
+from blast_env.response.levels import BayDamage, LevelOfProtection, level_of, worst
 from blast_env.site import AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.facade import BayComponents

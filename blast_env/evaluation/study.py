@@ -33,7 +33,7 @@ from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, standing
 from blast_env.layout import check_layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.site.structures import buildings_of
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.bays import BAY_M, STOREY_M, floors_m
 from blast_env.geometry import WallLine
-from blast_env.response.facade import BAY_M, STOREY_M, floors_m
 from blast_env.site.structures import AnyStructure
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import

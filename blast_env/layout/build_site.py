@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,12 @@ from blast_env.site.heights import highest_top_m
 from blast_env.site.structures import AnyStructure, ConcreteSquareSection
 from blast_env.site.terraces import ground_below_m
 from blast_env.values import checked_seed
-from blast_env.vehicles.drive import NOTHING, Drive, Obstacles
-from blast_env.vehicles.reach import Reach
-from blast_env.vehicles.worst_places import WorstPlaces
+from blast_env.vehicles.crash_rating import NOTHING, Obstacles
+
+if TYPE_CHECKING:  # most sites have no vehicle
+    from blast_env.vehicles.drive import Drive
+    from blast_env.vehicles.reach import Reach
+    from blast_env.vehicles.worst_places import WorstPlaces
 
 
 def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
@@ -55,7 +59,7 @@ def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
 
 def worst_places(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
-) -> WorstPlaces:
+) -> "WorstPlaces":
     """Return the worst places of a vehicle's charge against a layout.
 
     Args:
@@ -68,14 +72,14 @@ def worst_places(
 
 def vehicle_reach(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
-) -> Reach:
+) -> "Reach":
     """Return the reach of a vehicle; arguments as for `worst_places`."""
     return scenario.vehicle_ground(source, layout).reach(_obstacles(scenario, layout))
 
 
 def vehicle_drive(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
-) -> Drive:
+) -> "Drive":
     """Return the drive of a vehicle against a layout; arguments as for `worst_places`."""
     return scenario.vehicle_ground(source, layout).drive(_obstacles(scenario, layout))
 

@@ -28,7 +28,7 @@ from blast_env.site.zone import (
     reasons_against,
 )
 from blast_env.vehicles.access_way import closing_places, is_open
-from blast_env.vehicles.drive import CrashPiece, Obstacles
+from blast_env.vehicles.crash_rating import CrashPiece, Obstacles
 
 
 class LegalLayout(tuple[Element, ...]):

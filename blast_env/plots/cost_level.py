@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.plan import QUIET_INK
 from blast_env.plots.style import render_extra, unit_interval
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 
 with render_extra():
     from matplotlib.axes import Axes

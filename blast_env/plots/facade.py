@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from typing import Final
 
+from blast_env.bays import Bay
 from blast_env.evaluation.questions.verdict import BuildingResponse
 from blast_env.plots.style import render_extra
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import Bay, FacadeResponse
+from blast_env.response.facade import FacadeResponse
+from blast_env.response.levels import LevelOfProtection
 
 with render_extra():
     from matplotlib.axes import Axes

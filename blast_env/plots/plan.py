@@ -18,7 +18,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle, stacked_runs, standing
+from blast_env.geometry import Element, Piece, Rectangle, Wall, stacked_runs, standing
 from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
 from blast_env.particles.structure import Colour
 from blast_env.sections import PointM
@@ -38,7 +38,7 @@ from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.drive import Impact
 from blast_env.vehicles.driving import WayPoint
 from blast_env.vehicles.reach import squares_of
-from blast_env.vehicles.worst_places import Wall, nearest_point_m
+from blast_env.vehicles.worst_places import nearest_point_m
 
 PAGE: Final[Colour] = (255, 255, 255)
 SITE: Final[Colour] = (245, 247, 250)

@@ -8,11 +8,13 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.style import number_on_axis, render_extra
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Glazing, Wall
-from blast_env.response.damage import damage_number, level_of, under_triangle
-from blast_env.response.facade import FacadeBay, FacadeResponse
+from blast_env.response.components import FacadeBay, Glazing, Wall
+from blast_env.response.damage import damage_number, under_triangle
+from blast_env.response.facade import FacadeResponse
+from blast_env.response.glass import pane_of
+from blast_env.response.levels import LevelOfProtection, level_of
 from blast_env.response.sdof import impulses
+from blast_env.response.walls import panel_of
 from blast_env.units import PA_PER_KPA
 
 with render_extra():
@@ -156,7 +158,7 @@ def level_bounds(
     """
     found: dict[LevelOfProtection, FloatArray] = {}
     chosen, storey_m = component
-    part = chosen.panel(storey_m) if isinstance(chosen, Wall) else chosen.pane
+    part = panel_of(chosen, storey_m) if isinstance(chosen, Wall) else pane_of(chosen)
     for level in sorted(LevelOfProtection, reverse=True)[:-1]:
         low, high = (np.full(len(peak_pa), impulse_pa_s) for impulse_pa_s in impulses_pa_s)
         for _ in range(_HALVINGS):

@@ -17,7 +17,7 @@ from blast_env.plots.site_plan import (
     write_names,
 )
 from blast_env.plots.style import render_extra
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.sections import PointM
 from blast_env.site import AnyStructure, Scenario

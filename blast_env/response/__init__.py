@@ -5,58 +5,64 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.bays import Bay, divide
     from blast_env.response.barriers import RigidPiece, Stability, piece_responses
     from blast_env.response.buildings import (
         BuildingDamage,
-        LevelOfProtection,
         building_damage_probability,
         eardrum_peak_pa,
         eardrum_rupture_probability,
         ground_thresholds,
         level_of_protection,
     )
-    from blast_env.response.components import Glazing, Wall, catalogue, find_component
-    from blast_env.response.damage import (
+    from blast_env.response.components import (
         Alternatives,
+        FacadeBay,
+        GlassKind,
+        Glazing,
+        Interlayer,
+        Wall,
+        catalogue,
+        find_component,
+    )
+    from blast_env.response.damage import (
         TriangularLoads,
         bay_damages,
         damage_number,
-        fails_from,
-        level_of,
         under_triangle,
     )
     from blast_env.response.facade import (
-        Bay,
-        FacadeBay,
         FacadeResponse,
         assumption_words,
-        divide,
         force_words,
         peak_corrected,
         peak_factor,
         respond,
     )
     from blast_env.response.glass import (
-        GlassKind,
         GlazingCondition,
-        Interlayer,
         Pane,
         flight_condition,
         glazing_responses,
+        pane_of,
     )
+    from blast_env.response.levels import LevelOfProtection, fails_from, level_of
     from blast_env.response.plate_table import plate_curve
     from blast_env.response.requirements import Requirement
     from blast_env.response.sdof import Resistance, System, impulses, responses
-    from blast_env.response.walls import (
+    from blast_env.response.wall_sections import (
         CONCRETE_LIMITS,
         DamageLevel,
         Masonry,
-        Panel,
         ReinforcedConcrete,
         Sheeting,
         Supports,
+    )
+    from blast_env.response.walls import (
+        Panel,
         damage_level,
         load_mass_factors,
+        panel_of,
         panel_responses,
     )
 else:
@@ -107,6 +113,8 @@ __all__ = [
     "level_of",
     "level_of_protection",
     "load_mass_factors",
+    "pane_of",
+    "panel_of",
     "panel_responses",
     "peak_corrected",
     "peak_factor",

@@ -14,13 +14,13 @@ masonry houses. The last: Eisenberg and others 1975, as in Crowl & Louvar, Chemi
 """
 
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import UnknownNameError
-from blast_env.response.walls import DamageLevel
+from blast_env.response.levels import LevelOfProtection
+from blast_env.response.wall_sections import DamageLevel
 
 
 @dataclass(frozen=True)
@@ -113,38 +113,6 @@ def _probability(probit: FloatArray) -> FloatArray:
 
     result: FloatArray = ndtr(probit - 5.0)
     return result
-
-
-class LevelOfProtection(IntEnum):
-    """Level of protection of a building in the terms of UFC 4-010-01; a higher value is better."""
-
-    BELOW_STANDARDS = 0
-    VERY_LOW = 1
-    LOW = 2
-    MEDIUM = 3
-    HIGH = 4
-
-    @property
-    def label(self) -> str:
-        """Name in lower case."""
-        return self.name.lower().replace("_", " ")
-
-    @property
-    def title(self) -> str:
-        """Name with a capital letter, for sentences."""
-        return self.label.capitalize()
-
-    @classmethod
-    def named(cls, label: str) -> "LevelOfProtection":
-        """Return the level with a label; `BELOW_STANDARDS` is not allowed as a target.
-
-        Raises:
-            UnknownNameError: If no level has that label; the message suggests the nearest one.
-        """
-        levels = {cl.label: cl for cl in cls if cl is not cls.BELOW_STANDARDS}
-        if label not in levels:
-            raise UnknownNameError("level of protection", label, levels)
-        return levels[label]
 
 
 def level_of_protection(worst: DamageLevel) -> LevelOfProtection:

@@ -6,6 +6,9 @@ further components with the same keys, by section properties if none of the kind
 """
 
 import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Final, Literal
@@ -20,13 +23,12 @@ from pydantic import (
     ValidationError,
 )
 
+from blast_env.bays import Bay
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.hashing import HashMark
-from blast_env.response.glass import GlassKind, Interlayer, Pane
-from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheeting, Supports
+from blast_env.response.wall_sections import Masonry, ReinforcedConcrete, Sheeting, Supports
 from blast_env.values import plain_text
 
-_MM: Final = 1e-3
 PaneSide = Annotated[StrictFloat, Field(ge=0.05, le=20.0)]
 _Text = Annotated[str, Field(min_length=1, max_length=300), AfterValidator(plain_text)]
 
@@ -54,6 +56,53 @@ class _Component(BaseModel):
     cost_m2: Annotated[StrictFloat, Field(ge=0.0, le=1e9)] | None = None
 
 
+LEAST_INTERLAYER_MM: Final = 1.52
+"""Thickness of PVB below which laminated panes failed early in arena tests."""
+
+
+_ASSUMED_INTERLAYERS: Final = ((16_000.0, 0.15), (4_000.0, 0.1))
+"""Tension, N/m, and tearing share of PVB and film in the catalogue."""
+
+
+class GlassKind(StrEnum):
+    """Heat treatment of glass."""
+
+    ANNEALED = "annealed"
+    HEAT_STRENGTHENED = "heat_strengthened"
+    FULLY_TEMPERED = "fully_tempered"
+
+    @property
+    def type_factor(self) -> float:
+        """Load resistance over that of annealed glass (ASTM E1300, table 1)."""
+        return {"annealed": 1.0, "heat_strengthened": 2.0, "fully_tempered": 4.0}[self.value]
+
+
+class Interlayer(BaseModel):
+    """Interlayer of laminated glass, which retains the fragments.
+
+    The default values are an assumption of this project, without a published table: PVB of 1.52 mm
+    as a membrane with the tension of its cohesion, which tears at a share of the short side.
+
+    Attributes:
+        material: Whether it lies between plies, or is a film on the pane.
+        thickness_mm: Thickness.
+        tension_n_m: Tension of the broken pane in its plane, N/m.
+        tear_share: Deflection at which it tears or leaves the frame, over the short side.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    material: Literal["pvb", "film"] = "pvb"
+    thickness_mm: Annotated[StrictFloat, Field(ge=0.1, le=20.0)] = LEAST_INTERLAYER_MM
+    tension_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e9)] = 16_000.0
+    tear_share: Annotated[StrictFloat, Field(ge=0.001, le=1.0)] = 0.15
+
+    @property
+    def is_assumed(self) -> bool:
+        """Whether tension and tearing are assumptions of this project."""
+        return (self.tension_n_m, self.tear_share) in _ASSUMED_INTERLAYERS
+
+
 class Glazing(_Component):
     """Windows: as many equal panes as fit into the bay, at least one.
 
@@ -77,19 +126,6 @@ class Glazing(_Component):
     outer_thickness_mm: Annotated[StrictFloat, Field(le=100.0), AfterValidator(_none_or_pane)] = 0.0
     sill_m: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.9
 
-    @property
-    def pane(self) -> Pane:
-        """One of its panes."""
-        return Pane(
-            self.width_m,
-            self.height_m,
-            self.thickness_mm * _MM,
-            self.glass,
-            self.interlayer,
-            self.outer_thickness_mm * _MM,
-            self.sill_m,
-        )
-
 
 class Wall(_Component):
     """A wall panel that spans from floor to floor.
@@ -104,10 +140,6 @@ class Wall(_Component):
     section: Annotated[ReinforcedConcrete | Masonry | Sheeting, Field(discriminator="kind")]
     supports: Supports = Supports.SIMPLE
     span_m: Annotated[StrictFloat, Field(ge=0.1, le=50.0)] | None = None
-
-    def panel(self, storey_m: float) -> Panel:
-        """Return its panel in a storey of a given height."""
-        return Panel(self.section, storey_m if self.span_m is None else self.span_m, self.supports)
 
 
 Component = Annotated[Glazing | Wall, Field(discriminator="kind")]
@@ -140,3 +172,67 @@ def find_component(name: str) -> Glazing | Wall:
     if name not in known:
         raise UnknownNameError("component", name, known)
     return known[name]
+
+
+@dataclass(frozen=True)
+class FacadeBay:
+    """A bay with its components.
+
+    Attributes:
+        bay: The bay.
+        glazing: Its windows; `None` without.
+        wall: Its wall panel; `None` without.
+    """
+
+    bay: Bay
+    glazing: Glazing | None = None
+    wall: Wall | None = None
+
+    def __post_init__(self) -> None:
+        """Check that the window fits.
+
+        Raises:
+            BlastEnvError: If the bay is empty, or a pane is larger than its bay.
+        """
+        if self.glazing is None and self.wall is None:
+            raise BlastEnvError(f"bay {self.bay.name}: it has neither windows nor a wall")
+        if self.glazing is None:
+            return
+        top_m = self.glazing.sill_m + self.glazing.height_m
+        if self.glazing.width_m > self.bay.width_m + 1e-9 or top_m > self.bay.height_m + 1e-9:
+            raise BlastEnvError(
+                f"bay {self.bay.name}: a pane of {self.glazing.width_m:g} x"
+                f" {self.glazing.height_m:g} m over a sill of {self.glazing.sill_m:g} m must fit"
+                f" into {self.bay.width_m:g} x {self.bay.height_m:g} m"
+            )
+
+    @property
+    def panes(self) -> int:
+        """Number of panes: as many as fit side by side."""
+        if self.glazing is None:
+            return 0
+        return max(1, int(self.bay.width_m / self.glazing.width_m + 1e-9))
+
+    @property
+    def glazed_m2(self) -> float:
+        """Area of its panes."""
+        if self.glazing is None:
+            return 0.0
+        return self.panes * (self.glazing.width_m * self.glazing.height_m)
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """A bay with its possible components.
+
+    Attributes:
+        name: Name of the bay.
+        structure: Name of its structure.
+        glazing: Possible windows, by the name of their component.
+        wall: Possible wall panels, by the name of their component.
+    """
+
+    name: str
+    structure: str
+    glazing: Mapping[str, FacadeBay]
+    wall: Mapping[str, FacadeBay]

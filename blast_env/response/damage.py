@@ -1,58 +1,20 @@
 """Damage of bays as numbers, for each component that they have or may be given.
 
-A damage increases within its level and from level to level: below 1 it allows a high level of
-protection, from 1 medium, from 2 low, from 3 very low, from 4 to 5 none (`GlazingResponses.hazard`,
-`Limits.measure`). A search thus has a gradient everywhere. The damage of other components needs no
-new blast.
+A damage increases within its level and from level to level (`blast_env.response.levels`), so that a
+search has a gradient everywhere. The damage of other components needs no new blast.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import FacadeBay, FacadeResponse, peak_corrected, respond
+from blast_env.response.components import Alternatives
+from blast_env.response.facade import FacadeResponse, peak_corrected, respond
 from blast_env.response.glass import GlazingResponses, Pane, glazing_responses
+from blast_env.response.levels import BayDamage
 from blast_env.response.walls import Panel, PanelResponses, panel_responses
-
-
-@dataclass(frozen=True)
-class Alternatives:
-    """A bay with its possible components.
-
-    Attributes:
-        name: Name of the bay.
-        structure: Name of its structure.
-        glazing: Possible windows, by the name of their component.
-        wall: Possible wall panels, by the name of their component.
-    """
-
-    name: str
-    structure: str
-    glazing: Mapping[str, FacadeBay]
-    wall: Mapping[str, FacadeBay]
-
-
-@dataclass(frozen=True)
-class BayDamage:
-    """Damage of one bay under one blast.
-
-    Attributes:
-        name: Name of the bay.
-        structure: Name of its structure.
-        area_m2: Its area.
-        glazed_m2: Area of its panes.
-        damage: Damage by the name of the component, present or possible.
-    """
-
-    name: str
-    structure: str
-    area_m2: float
-    glazed_m2: float
-    damage: dict[str, float]
 
 
 def bay_damages(
@@ -175,18 +137,3 @@ def _areas(bay: Alternatives) -> tuple[float, float]:
     filled = (*bay.glazing.values(), *bay.wall.values())
     glazed_m2 = max((other_glass.glazed_m2 for other_glass in filled), default=0.0)
     return filled[0].bay.area_m2, glazed_m2
-
-
-def level_of(worst_damage: float) -> LevelOfProtection:
-    """Return the level of protection that corresponds to the worst damage of components."""
-    return LevelOfProtection(max(4 - int(worst_damage), 0))
-
-
-def worst(damages: Iterable[float]) -> float:
-    """Return the largest damage; 0 if there is none."""
-    return max(damages, default=0.0)
-
-
-def fails_from(target: LevelOfProtection) -> float:
-    """Return the damage from which a component no longer allows a level of protection."""
-    return float(5 - target)

@@ -1,256 +1,36 @@
-"""Bays, the divisions of a building's walls by storeys and axes, and their response.
+"""The response of facades, bay by bay.
 
-A bay is one storey high and about one module of the facade wide. It has components: windows, wall
-panels, or both side by side. Its load is the mean overpressure over the bay; all its components
-share that history.
+A bay has components: windows, wall panels, or both side by side. Its load is the mean overpressure
+over the bay; all its components share that history.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from math import cbrt, floor, inf
+from functools import cached_property
+from math import cbrt, inf
 from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.errors import BlastEnvError
-from blast_env.geometry import Rectangle, WallLine
-from blast_env.response.buildings import LevelOfProtection, level_of_protection
-from blast_env.response.components import Glazing, Wall
+from blast_env.response.buildings import level_of_protection
+from blast_env.response.components import LEAST_INTERLAYER_MM, FacadeBay
 from blast_env.response.glass import (
-    LEAST_INTERLAYER_MM,
     GlazingCondition,
     GlazingResponses,
-    Pane,
     drawn_conditions,
     glazing_responses,
+    pane_of,
 )
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.sdof import check_histories, impulses
-from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
-
-STOREY_M = 3.5
-"""Default height of a storey."""
-
-BAY_M = 3.0
-"""Default width of a bay."""
-
-_ROUNDING: Final = 1e-9
+from blast_env.response.wall_sections import DamageLevel
+from blast_env.response.walls import PanelResponses, panel_of, panel_responses
 
 _FINER = 4  # refinement of the times of sharpened histories
 
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
 """Cells per m/kg^(1/3) at which peaks are about half of Kingery and Bulmash's."""
-
-
-@dataclass(frozen=True)
-class Bay:
-    """A part of a wall.
-
-    Attributes:
-        structure: Name of the structure.
-        wall: The side that it faces: west, east, south or north.
-        storey: Counted from 1 at the ground.
-        number: Counted from 1 along the wall, from west to east or from south to north; for a
-            polygon around it, over all walls that mostly face this side.
-        left_m: Its beginning along the wall: x or y on the site, or the distance from the start of
-            the wall of a polygon.
-        right_m: Its end along the wall.
-        floor_m: Height of its floor above the ground.
-        top_m: Height of its upper edge.
-        line_number: Index of the wall of a polygon; `None` for a rectangle.
-        line: That wall.
-    """
-
-    structure: str
-    wall: str
-    storey: int
-    number: int
-    left_m: float
-    right_m: float
-    floor_m: float
-    top_m: float
-    line_number: int | None = None
-    line: WallLine | None = None
-
-    @property
-    def name(self) -> str:
-        """`office/west/2/5`: structure, wall, storey, number."""
-        return f"{self.structure}/{self.wall}/{self.storey}/{self.number}"
-
-    @property
-    def width_m(self) -> float:
-        """Its width."""
-        return self.right_m - self.left_m
-
-    @property
-    def height_m(self) -> float:
-        """Its height."""
-        return self.top_m - self.floor_m
-
-    @property
-    def area_m2(self) -> float:
-        """Its area."""
-        return self.width_m * self.height_m
-
-
-def floors_m(rise_m: float, storey_m: float = STOREY_M, storeys: int | None = None) -> list[float]:
-    """Return the heights of the floors above the base, m, the ground floor's first.
-
-    The ground floor has the remaining height if the storeys do not fill the building.
-
-    Args:
-        rise_m: Height of the building above its base.
-        storey_m: Height of the other storeys.
-        storeys: Number of storeys, which then are equally high.
-    """
-    if storeys is not None:
-        storey_m = rise_m / storeys
-    count = max(1, floor(rise_m / storey_m + _ROUNDING))
-    ground_m = max(rise_m - storey_m * (count - 1), storey_m)
-    return [0.0] + [ground_m + storey_m * number for number in range(count - 1)]
-
-
-def bays_in(
-    ground_m: Rectangle,
-    rise_m: float,
-    walls: Sequence[str],
-    storey_m: float,
-    bay_m: float,
-    lines: Sequence[WallLine] = (),
-    storeys: int | None = None,
-) -> int:
-    """Return the number of bays that `divide` makes, from the rise between base and top."""
-    along = (
-        _bays_along(high - low, bay_m)
-        for wall in walls
-        for *_, low, high in _stretches(ground_m, wall, lines)
-    )
-    return len(floors_m(rise_m, storey_m, storeys)) * sum(along)
-
-
-def _bays_along(length_m: float, bay_m: float) -> int:
-    return max(1, round(length_m / bay_m))
-
-
-def divide(
-    structure: str,
-    ground_m: Rectangle,
-    height_m: float,
-    walls: Sequence[str],
-    storey_m: float = STOREY_M,
-    bay_m: float = BAY_M,
-    base_m: float = 0.0,
-    lines: Sequence[WallLine] = (),
-    storeys: int | None = None,
-) -> tuple[Bay, ...]:
-    """Return the bays of a building, wall by wall, storey by storey.
-
-    The bays of a wall have equal widths, as close as possible to `bay_m`.
-
-    Args:
-        structure: Name of the structure.
-        ground_m: Its outline on the ground.
-        height_m: Height of its top above the ground.
-        walls: The walls to divide, of west, east, south, north.
-        storey_m: Height of a storey, see `floors_m`.
-        bay_m: Intended width of a bay.
-        base_m: Height of its base above the ground.
-        lines: The walls of a polygon; without them it is a block with four walls.
-        storeys: Number of storeys of equal height, in the place of `storey_m`.
-
-    Raises:
-        BlastEnvError: If a size is not positive.
-    """
-    rise_m = height_m - base_m
-    for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):
-        if not value > 0.0:
-            raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
-    levels_m = floors_m(rise_m, storey_m, storeys)
-    floors = [base_m + level_m for level_m in levels_m] + [height_m]
-    bays: list[Bay] = []
-    for wall in walls:
-        before = 0
-        for line_number, line, low, high in _stretches(ground_m, wall, lines):
-            # Bays of a polygon's side are counted on over all of its walls.
-            count = _bays_along(high - low, bay_m)
-            ends = np.linspace(low, high, count + 1).tolist()
-            bays += [
-                Bay(
-                    structure,
-                    wall,
-                    storey + 1,
-                    before + number + 1,
-                    ends[number],
-                    ends[number + 1],
-                    floors[storey],
-                    floors[storey + 1],
-                    line_number,
-                    line,
-                )
-                for storey in range(len(levels_m))
-                for number in range(count)
-            ]
-            before += count
-    return tuple(bays)
-
-
-def _stretches(
-    ground_m: Rectangle, side: str, lines: Sequence[WallLine]
-) -> Iterator[tuple[int | None, WallLine | None, float, float]]:
-    """Yield number and line of each wall on a side, and its ends; of a block, the side itself."""
-    if lines:
-        own = ((number, line) for number, line in enumerate(lines) if line.side == side)
-        yield from ((number, line, 0.0, line.length_m) for number, line in own)
-    elif side in ("west", "east"):
-        yield None, None, ground_m.bottom, ground_m.top
-    else:
-        yield None, None, ground_m.left, ground_m.right
-
-
-@dataclass(frozen=True)
-class FacadeBay:
-    """A bay with its components.
-
-    Attributes:
-        bay: The bay.
-        glazing: Its windows; `None` without.
-        wall: Its wall panel; `None` without.
-    """
-
-    bay: Bay
-    glazing: Glazing | None = None
-    wall: Wall | None = None
-
-    def __post_init__(self) -> None:
-        """Check that the window fits.
-
-        Raises:
-            BlastEnvError: If the bay is empty, or a pane is larger than its bay.
-        """
-        if self.glazing is None and self.wall is None:
-            raise BlastEnvError(f"bay {self.bay.name}: it has neither windows nor a wall")
-        if self.glazing is None:
-            return
-        top_m = self.glazing.sill_m + self.glazing.height_m
-        if self.glazing.width_m > self.bay.width_m + 1e-9 or top_m > self.bay.height_m + 1e-9:
-            raise BlastEnvError(
-                f"bay {self.bay.name}: a pane of {self.glazing.width_m:g} x"
-                f" {self.glazing.height_m:g} m over a sill of {self.glazing.sill_m:g} m must fit"
-                f" into {self.bay.width_m:g} x {self.bay.height_m:g} m"
-            )
-
-    @property
-    def panes(self) -> int:
-        """Number of panes: as many as fit side by side."""
-        if self.glazing is None:
-            return 0
-        return max(1, int(self.bay.width_m / self.glazing.width_m + 1e-9))
-
-    @property
-    def glazed_m2(self) -> float:
-        """Area of its panes."""
-        return 0.0 if self.glazing is None else self.panes * _pane(self.glazing).area_m2
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,7 +213,7 @@ def force_words(found: Iterable[FacadeResponse]) -> str:
     carried = []
     if edges >= 0.0:
         panes = {bay.glazing for facade in facades for bay in facade.bays if bay.glazing}
-        frame = 1e-3 * max(_pane(pane).frame_n_m for pane in panes)
+        frame = 1e-3 * max(pane_of(pane).frame_n_m for pane in panes)
         carried.append(f"{edges:.1f} kN/m at pane edges (ASTM F2248: {frame:.1f})")
     if supports >= 0.0:
         carried.append(f"{supports:.1f} kN/m at the supports of wall panels")
@@ -460,8 +240,8 @@ def cells_of(peak_factor: float) -> float:
 
 def slowest_period_s(bays: Sequence[FacadeBay]) -> float:
     """Return the longest natural period of the components of bays, s; 0 without components."""
-    panes = (_pane(bay.glazing).system for bay in bays if bay.glazing is not None)
-    panels = (_panel(bay.wall, bay.bay.height_m).system for bay in bays if bay.wall is not None)
+    panes = (pane_of(bay.glazing).system for bay in bays if bay.glazing is not None)
+    panels = (panel_of(bay.wall, bay.bay.height_m).system for bay in bays if bay.wall is not None)
     return max((pane.period_s for pane in (*panes, *panels)), default=0.0)
 
 
@@ -538,8 +318,8 @@ def respond(
     check_histories(len(bays), time_s, pressure_pa)
     glazed = [index for index, bay in enumerate(bays) if bay.glazing is not None]
     walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
-    panes = _panes(bays)
-    panels = _panels(bays)
+    panes = [pane_of(bay.glazing) for bay in bays if bay.glazing is not None]
+    panels = [panel_of(bay.wall, bay.bay.height_m) for bay in bays if bay.wall is not None]
     # Once with suction and once without: see above for the reason.
     pushed_pa = pushes(time_s, pressure_pa)
     return FacadeResponse(
@@ -607,11 +387,11 @@ def drawn_levels(
     history, loads = (time_s, pressure_pa), (draws.peaks, draws.durations)
     if is_window:
         assert filled.glazing is not None
-        condition = drawn_conditions(_pane(filled.glazing), *history, (*loads, draws.weaker))
+        condition = drawn_conditions(pane_of(filled.glazing), *history, (*loads, draws.weaker))
         levels = np.array([0, *map(level_by_glass, GlazingCondition)])
         return np.asarray(levels[condition.astype(np.int64)])
     assert filled.wall is not None
-    panel = _panel(filled.wall, filled.bay.height_m)
+    panel = panel_of(filled.wall, filled.bay.height_m)
     damage = panel.drawn_damage(*history, (*loads, draws.resistance))
     return np.asarray(4 - np.minimum(damage, 4.0).astype(np.int64))
 
@@ -621,23 +401,3 @@ def pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     last = impulses(time_s, pressure_pa).argmax(axis=-1)
     counts = np.arange(len(time_s)) <= last[:, np.newaxis]
     return np.where(counts, np.maximum(pressure_pa, 0.0), 0.0)
-
-
-def _panes(bays: Sequence[FacadeBay]) -> list[Pane]:
-    """Return a pane of each bay with windows; equal panes share one object and its costly curve."""
-    return [_pane(bay.glazing) for bay in bays if bay.glazing is not None]
-
-
-def _panels(bays: Sequence[FacadeBay]) -> list[Panel]:
-    """Return the panel of each bay with a wall; equal panels share one object."""
-    return [_panel(bay.wall, bay.bay.height_m) for bay in bays if bay.wall is not None]
-
-
-@lru_cache(maxsize=256)
-def _pane(glazing: Glazing) -> Pane:
-    return glazing.pane
-
-
-@lru_cache(maxsize=256)
-def _panel(wall: Wall, height_m: float) -> Panel:
-    return wall.panel(height_m)

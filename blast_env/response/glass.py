@@ -22,16 +22,16 @@ fragments, as a stretched membrane, until it tears.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
-from functools import cached_property
+from enum import IntEnum
+from functools import cached_property, lru_cache
 from math import ceil
-from typing import Annotated, Final, Literal
+from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.response.components import GlassKind, Glazing, Interlayer
 from blast_env.response.plate_table import WEIBULL_M, plate_curve
 from blast_env.response.sdof import (
     STEPS_PER_PERIOD,
@@ -53,12 +53,8 @@ DENSITY_KG_M3: Final = 2500.0
 STATIC_FATIGUE: Final = 16.0
 """Exponent of the duration of load (ASTM E1300)."""
 
-LEAST_INTERLAYER_MM: Final = 1.52
-"""Thickness of PVB below which laminated panes failed early in arena tests."""
 
-_ASSUMED_INTERLAYERS: Final = ((16_000.0, 0.15), (4_000.0, 0.1))
-"""Tension, N/m, and tearing share of PVB and film in the catalogue."""
-
+_MM: Final = 1e-3
 _REFERENCE_S: Final = 60.0
 _GRAVITY_M_S2: Final = 9.81
 _NEAR_M: Final = 1.0
@@ -71,19 +67,6 @@ _RISK_OF_DAMAGE: Final = WEIBULL_M / STATIC_FATIGUE
 
 _STIFFENING: Final = 3
 """Refinement of the time step, for the shorter period of a pane near breakage than at rest."""
-
-
-class GlassKind(StrEnum):
-    """Heat treatment of glass."""
-
-    ANNEALED = "annealed"
-    HEAT_STRENGTHENED = "heat_strengthened"
-    FULLY_TEMPERED = "fully_tempered"
-
-    @property
-    def type_factor(self) -> float:
-        """Load resistance over that of annealed glass (ASTM E1300, table 1)."""
-        return {"annealed": 1.0, "heat_strengthened": 2.0, "fully_tempered": 4.0}[self.value]
 
 
 class GlazingCondition(IntEnum):
@@ -114,32 +97,6 @@ class GlazingCondition(IntEnum):
     def words(self) -> str:
         """Both: `3a, D`."""
         return f"{self.label}, {self.rating}"
-
-
-class Interlayer(BaseModel):
-    """Interlayer of laminated glass, which retains the fragments.
-
-    The default values are an assumption of this project, without a published table: PVB of 1.52 mm
-    as a membrane with the tension of its cohesion, which tears at a share of the short side.
-
-    Attributes:
-        material: Whether it lies between plies, or is a film on the pane.
-        thickness_mm: Thickness.
-        tension_n_m: Tension of the broken pane in its plane, N/m.
-        tear_share: Deflection at which it tears or leaves the frame, over the short side.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    material: Literal["pvb", "film"] = "pvb"
-    thickness_mm: Annotated[StrictFloat, Field(ge=0.1, le=20.0)] = LEAST_INTERLAYER_MM
-    tension_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e9)] = 16_000.0
-    tear_share: Annotated[StrictFloat, Field(ge=0.001, le=1.0)] = 0.15
-
-    @property
-    def is_assumed(self) -> bool:
-        """Whether tension and tearing are assumptions of this project."""
-        return (self.tension_n_m, self.tear_share) in _ASSUMED_INTERLAYERS
 
 
 @dataclass(frozen=True)
@@ -391,6 +348,20 @@ class GlazingResponses:
         return GlazingResponses(
             *(np.where(worse, getattr(other, name), own) for name, own in vars(self).items())
         )
+
+
+@lru_cache(maxsize=256)
+def pane_of(glazing: Glazing) -> Pane:
+    """Return a pane of some windows; equal ones share one object and its costly curve."""
+    return Pane(
+        glazing.width_m,
+        glazing.height_m,
+        glazing.thickness_mm * _MM,
+        glazing.glass,
+        glazing.interlayer,
+        glazing.outer_thickness_mm * _MM,
+        glazing.sill_m,
+    )
 
 
 def glazing_responses(

@@ -5,10 +5,9 @@ from math import inf
 from typing import Final
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.damage import level_of
 from blast_env.response.facade import FacadeResponse, level_by_glass
 from blast_env.response.glass import GlazingCondition
+from blast_env.response.levels import LevelOfProtection, level_of
 from blast_env.response.sdof import impulses
 from blast_env.units import PA_PER_KPA
 from blast_env.values import plain_number

@@ -17,16 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
+from blast_env.bays import Bay
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
 from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError, unknown_name
-from blast_env.response.barriers import RigidPiece
-from blast_env.response.facade import Bay
 from blast_env.sections import FOR_PEOPLE, Height, Name, Section, SparseSection
 from blast_env.site.sections import Count
 from blast_env.site.structures import FacadePart
-from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.crash_rating import CrashRating
 
 Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]
@@ -139,19 +137,6 @@ class Item(Barrier):
                 [Problem(key, f"must be left out: {name!r} has {barrier[key]:g}") for key in fixed],
             )
         return {"name": name, **barrier, **own}
-
-    @property
-    def rigid_piece(self) -> RigidPiece:
-        """A piece as a rigid body."""
-        return RigidPiece.of_block(
-            MODULE_SIDE_M * self.length_modules,
-            MODULE_SIDE_M * self.thickness_modules,
-            self.height_m,
-            self.mass_kg,
-            self.base_width_m,
-            self.friction,
-            self.anchorage_n or 0.0,
-        )
 
     @model_validator(mode="after")
     def _check_rating(self) -> Self:

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import AfterValidator, Field, StrictInt
 
-from blast_env.geometry import Element, Rectangle
+from blast_env.geometry import Element, Rectangle, Wall
 from blast_env.hashing import HashMark
 from blast_env.response.components import Component
 from blast_env.sections import FOR_PEOPLE, Name, Section, Site
@@ -17,8 +17,10 @@ from blast_env.site.sections import AnyGeoreference, GaugeSection, SimulationSec
 from blast_env.site.sources import AnySource, VehicleSource
 from blast_env.site.structures import AnyStructure, loaded_walls
 from blast_env.site.zone import BuildZone, Surroundings
-from blast_env.vehicles.drive import CrashPiece, VehicleGround
-from blast_env.vehicles.worst_places import Wall
+from blast_env.vehicles.crash_rating import CrashPiece
+
+if TYPE_CHECKING:
+    from blast_env.vehicles.drive import VehicleGround
 
 SCHEMA_VERSION: Final = 2
 """The version of the file format."""
@@ -105,7 +107,7 @@ class Content(Section):
 
     def vehicle_ground(
         self, source: VehicleSource, layout: Iterable[Element] = ()
-    ) -> VehicleGround:
+    ) -> "VehicleGround":
         """Return a vehicle's ground without barriers and the structures that a layout removes."""
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
         key = source, away
@@ -116,12 +118,14 @@ class Content(Section):
         return self._grounds[key]
 
     @cached_property
-    def _grounds(self) -> dict[tuple[VehicleSource, frozenset[str]], VehicleGround]:
+    def _grounds(self) -> dict[tuple[VehicleSource, frozenset[str]], "VehicleGround"]:
         return {}
 
     def _ground_of(
         self, source: VehicleSource, structures: tuple[AnyStructure, ...]
-    ) -> VehicleGround:
+    ) -> "VehicleGround":
+        from blast_env.vehicles.drive import VehicleGround  # most sites have no vehicle
+
         way = None if self.build_zone is None else self.build_zone.access_way
         closed: tuple[Rectangle, ...] = ()
         rated: tuple[CrashPiece, ...] = ()

@@ -23,11 +23,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from blast_env.bays import Bay, bays_in, divide
 from blast_env.errors import BlastEnvError
 from blast_env.problems import Problem, unknown_name
-from blast_env.response.components import Glazing, Wall, catalogue
-from blast_env.response.damage import Alternatives
-from blast_env.response.facade import Bay, FacadeBay, bays_in, divide
+from blast_env.response.components import Alternatives, FacadeBay, Glazing, Wall, catalogue
 from blast_env.site.catalogue import Hardening
 from blast_env.site.structures import AnyStructure, FacadeSection
 

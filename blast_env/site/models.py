@@ -20,9 +20,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
 from blast_env.hashing import HashMark, digest_of, fields_with, hashed_content
 from blast_env.problems import Problem, ScenarioError, problems_from
-from blast_env.response.components import Glazing, Wall, catalogue
-from blast_env.response.damage import Alternatives
-from blast_env.response.facade import FacadeBay
+from blast_env.response.components import Alternatives, FacadeBay, Glazing, Wall, catalogue
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems

@@ -9,8 +9,7 @@ from pydantic import Field, StrictFloat, model_validator
 from blast_env.arrays import FloatArray
 from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.damage import fails_from
+from blast_env.response.levels import LevelOfProtection, fails_from
 from blast_env.sections import Section
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level, conditional_value_at_risk
 

@@ -29,7 +29,6 @@ from blast_env.geometry import (
     overlapping_any,
 )
 from blast_env.hashing import HashMark
-from blast_env.response.barriers import RigidPiece
 from blast_env.sections import FOR_PEOPLE, Area, Height, PointM, Section, Site, SparseSection
 from blast_env.site.catalogue import (
     MOST_ITEMS,
@@ -191,21 +190,6 @@ class BuildZone(Section):
         """Return the name of a piece in tables: its item and its centre in metres."""
         x_m, y_m = self.element_rectangle_m(piece).centre
         return f"{piece.item}_x{x_m:.3f}_y{y_m:.3f}"
-
-    def rigid_piece(self, element: Element) -> RigidPiece | None:
-        """Return a piece or a module as a rigid body.
-
-        It is `None` for a module as high as the air, and for a measure.
-
-        Raises:
-            LayoutError: If there is no such item, or it cannot be turned.
-        """
-        variant = self.catalogue.variant(element)
-        if not variant.height_m:
-            return None
-        if self.items:
-            return self.items[variant.item].rigid_piece
-        return RigidPiece.of_block(MODULE_SIDE_M, MODULE_SIDE_M, variant.height_m)
 
     def element_rectangle_m(self, element: Element) -> Rectangle:
         """Return the rectangle that a module or a piece covers.

@@ -9,6 +9,7 @@ from blast_env.arrays import BoolArray
 from blast_env.geometry import TOLERANCE_M, Rectangle
 from blast_env.problems import Problem, extent
 from blast_env.sections import Area
+from blast_env.site.content import Content
 from blast_env.site.zone import (
     BuildZone,
     EmptyZone,
@@ -185,3 +186,12 @@ def _gate_fault(zone: BuildZone, way: AccessWay, gate: Rectangle) -> str | None:
             f" {way.width_m:g} m, the way's width"
         )
     return None
+
+
+def outside_site(
+    scenario: Content, key: str, description: str, rectangle: Rectangle
+) -> Iterator[Problem]:
+    """Yield a problem if a rectangle is not inside the site."""
+    if not scenario.site.rectangle_m.contains(rectangle):
+        site = extent(scenario.site.rectangle_m)
+        yield Problem(key, f"{description} must lie inside the site ({site})")

@@ -23,7 +23,7 @@ from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
-from blast_env.response.damage import BayDamage
+from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.layers import SingleArray, first_sums, two_layers
 from blast_env.surrogate.pieces import Box, Numbers, PieceKnowledge, PointLayers

@@ -12,7 +12,8 @@ from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.record import structure_response
 from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
-from blast_env.response.damage import BayDamage, TriangularLoads
+from blast_env.response.damage import TriangularLoads
+from blast_env.response.levels import BayDamage
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.facade import BayComponents

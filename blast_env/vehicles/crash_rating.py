@@ -10,11 +10,12 @@ import re
 from collections.abc import Mapping
 from math import radians, sin
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.errors import value_text
+from blast_env.geometry import Rectangle
 from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
 from blast_env.sections import FOR_PEOPLE, Section
@@ -154,3 +155,35 @@ def _read_vehicle(found: re.Match[str]) -> dict[str, float | str]:
         "penetration_m": max(float(found["m"]), 0.0),
         "measured_from": "rear" if of_pas else "front",
     }
+
+
+class CrashPiece(NamedTuple):
+    """A piece or gate that stops the vehicles covered by its crash rating.
+
+    Attributes:
+        rectangle: Its rectangle, m.
+        rating: Its crash rating.
+        name: Its name in messages.
+    """
+
+    rectangle: Rectangle
+    rating: CrashRating
+    name: str
+
+
+class Obstacles(NamedTuple):
+    """The obstacles of a layout for vehicles, rectangles in m.
+
+    Attributes:
+        stops: Obstacles that stop every vehicle.
+        solid: Obstacles that vehicles drive over, but inside which no charge goes off.
+        rated: Obstacles with a crash rating.
+    """
+
+    stops: tuple[Rectangle, ...] = ()
+    solid: tuple[Rectangle, ...] = ()
+    rated: tuple[CrashPiece, ...] = ()
+
+
+NOTHING: Final = Obstacles()
+"""The empty site."""

@@ -22,52 +22,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Rectangle, WallName, stacked_runs
+from blast_env.geometry import Rectangle, Wall, WallName, stacked_runs
 from blast_env.sections import PointM, Site
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.crash_rating import CrashRating
+from blast_env.vehicles.crash_rating import NOTHING, CrashPiece, Obstacles
 from blast_env.vehicles.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
 from blast_env.vehicles.reach import Reach, ReachQuery, steps_of
 from blast_env.vehicles.vehicle import Entry, Vehicle
-from blast_env.vehicles.worst_places import Wall, WorstPlaces, least_distances_m, worst_of
+from blast_env.vehicles.worst_places import WorstPlaces, least_distances_m, worst_of
 
 _SAME_M: Final = 1e-9
 """Tolerance within which edges are equal, as in `Rectangle.contains`."""
-
-MOST_PLACES: Final = 3_000_000
-"""Most places of the charges of all vehicles: three vehicles on the largest site."""
-
-
-class CrashPiece(NamedTuple):
-    """A piece or gate that stops the vehicles covered by its crash rating.
-
-    Attributes:
-        rectangle: Its rectangle, m.
-        rating: Its crash rating.
-        name: Its name in messages.
-    """
-
-    rectangle: Rectangle
-    rating: CrashRating
-    name: str
-
-
-class Obstacles(NamedTuple):
-    """The obstacles of a layout for vehicles, rectangles in m.
-
-    Attributes:
-        stops: Obstacles that stop every vehicle.
-        solid: Obstacles that vehicles drive over, but inside which no charge goes off.
-        rated: Obstacles with a crash rating.
-    """
-
-    stops: tuple[Rectangle, ...] = ()
-    solid: tuple[Rectangle, ...] = ()
-    rated: tuple[CrashPiece, ...] = ()
-
-
-NOTHING: Final = Obstacles()
-"""The empty site."""
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,9 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle, WallLine, distances_between_m
+from blast_env.geometry import Wall, WallLine, distances_between_m
 from blast_env.sections import PointM
 from blast_env.vehicles.vehicle import Vehicle
-
-Wall = Rectangle | WallLine
-"""A wall in plan; that of a rectangular structure is a rectangle of width 0."""
 
 _EQUAL_M: Final = 1e-6
 """Tolerance within which distances are equal."""

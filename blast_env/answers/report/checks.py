@@ -13,6 +13,7 @@ from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import LayoutState
 from blast_env.response.components import Glazing
 from blast_env.response.facade import FacadeResponse
+from blast_env.response.glass import pane_of
 from blast_env.response.sdof import impulses
 from blast_env.site.structures import buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA
@@ -107,7 +108,7 @@ def _sum(facade: FacadeResponse) -> tuple[str, ...]:
 
 
 def _pane(glazing: Glazing) -> tuple[str, ...]:
-    pane = glazing.pane
+    pane = pane_of(glazing)
     load_kpa = pane.load_resistance_pa() / PA_PER_KPA
     return (
         f"{glazing.title}: {pane.width_m:g} x {pane.height_m:g} m, least thickness"

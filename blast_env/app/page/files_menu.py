@@ -18,7 +18,7 @@ from blast_env.gas.cost import cost_words
 from blast_env.gas.settings import Cells
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.provenance import versions
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.site import Scenario
 
 _CELLS: Final[dict[tuple[Cells, Cells], str]] = {

@@ -12,7 +12,7 @@ from blast_env.atlas import packaged_laws
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import screen
 from blast_env.geometry import Layout
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
 from blast_env.site.presets import CHARGE_PRESETS, PRESETS_SOURCE, MassPreset

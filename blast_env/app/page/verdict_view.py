@@ -12,7 +12,7 @@ from blast_env.app.session import Session
 from blast_env.app.work import Answer, Question
 from blast_env.errors import BlastEnvError
 from blast_env.gas.cost import cost_words
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 
 _HEADINGS = {
     Question.ASSESS: "Does the layout comply?",

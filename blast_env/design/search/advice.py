@@ -21,7 +21,7 @@ from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
-from blast_env.response.damage import worst
+from blast_env.response.levels import worst
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator

@@ -23,7 +23,7 @@ from blast_env.evaluation.questions.probability import Uncertainty, level_probab
 from blast_env.evaluation.questions.verdict import Consequences, Verdict, consequences_of
 from blast_env.geometry import Layout
 from blast_env.layout.placement import load_relevant
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, share_of
 from blast_env.site import Scenario
 from blast_env.site.content import SCHEMA_VERSION

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
+from blast_env.bays import Bay
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas_validation import bay_validations
 from blast_env.evaluation.record import WallsWithoutVerdict
@@ -21,9 +22,11 @@ from blast_env.evaluation.validation import VALIDATION_COLUMNS, Validation
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
-from blast_env.response.damage import Alternatives, BayDamage, bay_damages
-from blast_env.response.facade import Bay, FacadeBay, FacadeResponse, respond
+from blast_env.response.components import Alternatives, FacadeBay
+from blast_env.response.damage import bay_damages
+from blast_env.response.facade import FacadeResponse, respond
 from blast_env.response.glass import GlazingCondition
+from blast_env.response.levels import BayDamage
 from blast_env.response.sdof import impulses
 from blast_env.site.blast_site import StructureOutline
 from blast_env.tables import Column, table_of

@@ -62,8 +62,8 @@ from blast_env.gas.tables import (
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_site import build_site, draw_threat, outlines
 from blast_env.provenance import versions
-from blast_env.response.damage import BayDamage
 from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
+from blast_env.response.levels import BayDamage
 from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import (
     AnyCharge,

@@ -7,11 +7,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.bays import Bay
 from blast_env.evaluation.validation import NOT_KNOWN, Validation, ValidationStatus
 from blast_env.gas.oblique_walls import STEPPED
 from blast_env.gas.settings import cells_unchecked, distance_unchecked
 from blast_env.geometry import Rectangle
-from blast_env.response.facade import Bay
 from blast_env.site.blast_site import OUTWARDS, BlastSite
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M

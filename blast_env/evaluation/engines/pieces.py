@@ -64,6 +64,31 @@ class _Way(NamedTuple):
     faces: int
 
 
+def rigid_piece(zone: BuildZone, element: Element) -> RigidPiece | None:
+    """Return a piece or a module as a rigid body.
+
+    It is `None` for a module as high as the air, and for a measure.
+
+    Raises:
+        LayoutError: If there is no such item, or it cannot be turned.
+    """
+    variant = zone.catalogue.variant(element)
+    if not variant.height_m:
+        return None
+    if not zone.items:
+        return RigidPiece.of_block(MODULE_SIDE_M, MODULE_SIDE_M, variant.height_m)
+    item = zone.items[variant.item]
+    return RigidPiece.of_block(
+        MODULE_SIDE_M * item.length_modules,
+        MODULE_SIDE_M * item.thickness_modules,
+        item.height_m,
+        item.mass_kg,
+        item.base_width_m,
+        item.friction,
+        item.anchorage_n or 0.0,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class PieceLoads:
     """The pressure histories on both sides of the pieces of a barrier.
@@ -98,7 +123,9 @@ class PieceLoads:
         if zone is None or not layout:
             return None
         bodied = [
-            (element, body) for element in layout if (body := zone.rigid_piece(element)) is not None
+            (element, body)
+            for element in layout
+            if (body := rigid_piece(zone, element)) is not None
         ]
         if not bodied:
             return None

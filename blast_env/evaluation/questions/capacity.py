@@ -18,7 +18,7 @@ from blast_env.evaluation.questions.probability import MASS_RANGE, scaled_to
 from blast_env.evaluation.questions.verdict import Consequences, check_facades, consequences_of
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import charge_against
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.questions.verdict import Consequences, Verdict
 from blast_env.evaluation.record import BuildingLoad
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.levels import LevelOfProtection
 from blast_env.units import PA_PER_KPA
 from blast_env.values import count_of, plain_number
 

@@ -32,9 +32,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas_validation import bay_places
 from blast_env.evaluation.questions.grid_error import GridError, impulse_of
 from blast_env.evaluation.questions.verdict import BuildingResponse, Consequences
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.sdof import impulses
 from blast_env.site.blast_site import Charge
 from blast_env.values import generator, whole_number

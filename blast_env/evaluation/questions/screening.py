@@ -21,26 +21,20 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.atlas import Laws, SiteAtlas, Surroundings, Walls
+from blast_env.bays import STOREY_M
 from blast_env.curves import CURVES_SCALED_M, Ways, in_the_open, normally_reflected
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas_validation import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
 from blast_env.layout.build_site import build_site, worst_places
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Glazing, Wall, catalogue
-from blast_env.response.damage import damage_number, level_of, triangle, under_triangle
-from blast_env.response.facade import (
-    STOREY_M,
-    FacadeBay,
-    FacadeResponse,
-    assumption_words,
-    respond,
-    response_words,
-)
-from blast_env.response.glass import Pane
+from blast_env.response.components import FacadeBay, Glazing, Wall, catalogue
+from blast_env.response.damage import damage_number, triangle, under_triangle
+from blast_env.response.facade import FacadeResponse, assumption_words, respond, response_words
+from blast_env.response.glass import Pane, pane_of
+from blast_env.response.levels import LevelOfProtection, level_of
 from blast_env.response.requirements import Requirement
-from blast_env.response.walls import Panel
+from blast_env.response.walls import Panel, panel_of
 from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.blast_site import BlastSite, Charge
@@ -303,7 +297,7 @@ def stand_offs(
     curves = _Curves(charge)
     found = []
     for name, component in components.items():
-        part = component.panel(storey_m) if isinstance(component, Wall) else component.pane
+        part = panel_of(component, storey_m) if isinstance(component, Wall) else pane_of(component)
         distances_m = {level: curves.stand_off_m(part, level) for level in _LEVELS}
         found.append(StandOff(name, component, distances_m, curves.least_m, curves.most_m))
     return tuple(found)
@@ -431,8 +425,8 @@ class _Facade:
             key = bay.glazing, bay.wall, round(bay.bay.height_m, 6)
             if key not in known:
                 known[key] = len(known)
-                own: list[Pane | Panel] = [] if bay.glazing is None else [bay.glazing.pane]
-                own += [] if bay.wall is None else [bay.wall.panel(bay.bay.height_m)]
+                own: list[Pane | Panel] = [] if bay.glazing is None else [pane_of(bay.glazing)]
+                own += [] if bay.wall is None else [panel_of(bay.wall, bay.bay.height_m)]
                 parts.append(own)
             numbers.append(known[key])
         return np.array(numbers), parts

@@ -40,13 +40,8 @@ from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
 from blast_env.layout.placement import load_relevant
-from blast_env.response.buildings import (
-    BuildingDamage,
-    LevelOfProtection,
-    building_damage_probability,
-)
-from blast_env.response.components import Glazing, catalogue
-from blast_env.response.damage import worst
+from blast_env.response.buildings import BuildingDamage, building_damage_probability
+from blast_env.response.components import LEAST_INTERLAYER_MM, Glazing, catalogue
 from blast_env.response.facade import (
     FacadeResponse,
     assumption_words,
@@ -55,9 +50,9 @@ from blast_env.response.facade import (
     peak_corrected,
     respond,
 )
-from blast_env.response.glass import LEAST_INTERLAYER_MM
+from blast_env.response.levels import LevelOfProtection, worst
 from blast_env.response.sdof import impulses
-from blast_env.response.walls import DamageLevel
+from blast_env.response.wall_sections import DamageLevel
 from blast_env.site import Scenario
 from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.facade import with_glass

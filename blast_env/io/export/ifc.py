@@ -9,6 +9,7 @@ from uuid import NAMESPACE_URL, uuid5
 import shapely
 
 from blast_env.errors import import_extra
+from blast_env.evaluation.engines.pieces import rigid_piece
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece
 from blast_env.io.export.bill import MODULE, LayoutPlan, placed_elements
@@ -128,7 +129,7 @@ class _Model:
                 "StopsVehicles": placed.variant.stops_vehicles,
                 "AsHighAsTheAir": block.height_m is None,
             }
-            body = scenario.build_zone.rigid_piece(placed.element)
+            body = rigid_piece(scenario.build_zone, placed.element)
             if body is not None:
                 length_m = MODULE_SIDE_M * (1 if item is None else item.length_modules)
                 properties["MassKg"] = body.mass_kg_m * length_m

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from blast_env.arrays import FloatArray
+from blast_env.bays import Bay
 from blast_env.geometry import Layout, Rectangle
 from blast_env.io.export.bill import LayoutPlan
 from blast_env.io.export.gltf import Mesh, write_glb
@@ -15,7 +16,6 @@ from blast_env.layout.build_site import barrier_outline, outlines
 from blast_env.particles.structure import Colour, LoadColours
 from blast_env.plots.plan import BARRIER, EXPLOSIVE, FAINT, PROTECTED, STRUCTURE
 from blast_env.plots.style import nice_ceiling, unit_interval
-from blast_env.response.facade import Bay
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge, StructureOutline
 
