@@ -146,6 +146,8 @@ def with_double_cells(grid: GasGrid) -> GasGrid:
 
     The first layer of a skirt is as thick as these cells, and becomes a layer of the grid.
     """
+    # (1) Eight cells become one, which is solid if four of them are; (2) the innermost layer of a
+    # skirt is twice as thick as a cell: it joins the grid; (3) the origin moves out by it.
     nx, ny, nz = (n // 2 for n in grid.shape)
     eighths = grid.solid.reshape(nx, 2, ny, 2, nz, 2).sum(axis=(1, 3, 5))
     taken = [(int(low > 0), int(high > 0)) for low, high in grid.buffer_layers_by_axis]

@@ -55,11 +55,14 @@ class Faces:
         Returns:
             Lane of the cell and index of the face (n, 2); first entry of each vector, and the end.
         """
+        # 1. The place of each face in the arrays of the kernels, axis by axis.
         nz, ny, nx = shape
         high = np.maximum(self.air, self.solid) + grid.lead
         place = ((self.axis * nz + high[:, 2]) * ny + high[:, 1]) * nx + high[:, 0]
+        # 2. The faces in that order, so that a sweep meets them vector by vector.
         order = np.argsort(place, kind="stable")
         table = np.stack((place[order] % lanes, order), axis=1).astype(np.int32)
+        # 3. The first entry of each vector; one without faces begins where the next one does.
         vectors = np.arange(3 * nz * ny * nx // lanes + 1)
         first = np.searchsorted(place[order] // lanes, vectors).astype(np.int32)
         return np.ascontiguousarray(table), first
@@ -84,6 +87,8 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
         raise BlastEnvError(f"cells has shape {cells.shape}, but the grid {grid.shape}")
     if (cells & ~grid.solid).any():
         raise BlastEnvError("cells holds cells of air, but only solid cells have faces")
+    # In each of six directions: the neighbours of the chosen cells, those in the grid, and of these
+    # the ones with air.
     air: list[NDArray[np.int64]] = []
     axes: list[NDArray[np.int64]] = []
     sides: list[NDArray[np.int64]] = []

@@ -25,6 +25,9 @@ BUFFER_GROWTH: Final = 2.0
 
 def layers_to(cells: float) -> int:
     """Return the number of layers of a skirt at least as thick as a number of cells."""
+    # n layers of widths g, g^2, g^3, ... are g (g^n - 1) / (g - 1) thick together, which is solved
+    # for n. Rounded before the ceiling, because logarithms of powers of g are whole but for their
+    # last bits.
     inner = 1.0 + cells * (BUFFER_GROWTH - 1.0) / BUFFER_GROWTH
     return ceil(round(log(inner) / log(BUFFER_GROWTH), 9))
 
@@ -153,6 +156,7 @@ class GasGrid:
 
     def narrowness(self, axis: int) -> NDArray[np.float64]:
         """Return the ratio of the cell side to the width of each array cell along an axis (n,)."""
+        # Layers widen by g from the grid outwards; the margin has the width of the last one.
         low, high = self.buffer_layers_by_axis[axis]
         own = np.ones(self.shape[axis] + 2 * MARGIN)
         grown = BUFFER_GROWTH ** -np.arange(1.0, self.buffer_layers + 1.0)
@@ -161,6 +165,8 @@ class GasGrid:
 
     def codes(self) -> NDArray[np.int8]:
         """Return the codes of the cells for the kernels, with skirt and margin (z, y, x)."""
+        # (1) Everything is beyond an open face; (2) the grid and its skirt, through which solids at
+        # a face go on; (3) the margin beyond a mirror.
         codes = np.full(self.array_shape, OPEN, dtype=np.int8)
         inner = slice(MARGIN, -MARGIN)
         solid = np.pad(self.solid, self.buffer_layers_by_axis, mode="edge")

@@ -133,6 +133,7 @@ def _ghost(air: Any, own: Variables, other: Variables, side: Any) -> Variables:
     `side` is the factor of the normal velocity: -1 in a mirror, 1 beyond an open face.
     """
     return (
+        # A wall turns the normal velocity round, an open face passes it on (Toro, section 6.3.3).
         select(air, own[0], other[0]),
         select(air, own[1], side * other[1]),
         select(air, own[2], other[2]),
@@ -181,12 +182,14 @@ def _at_faces(
     dr, du, dv = select(good, dr, zero), select(good, du, zero), select(good, dv, zero)
     dw, dp = select(good, dw, zero), select(good, dp, zero)
 
+    # 4. The same for the share of fuel, which must not fall below 0.
     dy = zero
     if fuel:
         dy = _half_slope(low[5], y, high[5], quarter, zero)
         y_half = y - ratio * (here[1] * dy)
         good = y_half - size(dy) >= zero
         y, dy = select(good, y_half, y), select(good, dy, zero)
+    # 5. Half a slope to either face.
     below = (r - dr, u - du, v - dv, w - dw, p - dp, y - dy)
     above = (r + dr, u + du, v + dv, w + dw, p + dp, y + dy)
     return below, above
@@ -275,6 +278,7 @@ def _update(
     high: Variables,
 ) -> None:
     """Change the cells of a vector by the difference of the fluxes through their two faces."""
+    # Conservative update (Toro, section 5.3): u_new = u - dt / dx (F_high - F_low).
     air = load_codes(state, code, at) == fill(state, 0.0)
     u = (X_MOMENTUM + axis) * cells + at
     v = (X_MOMENTUM + (axis + 1) % 3) * cells + at
@@ -312,6 +316,7 @@ def _record_walls(flux: Any, vector: int, recorded: Any, work: Any) -> None:
 def _note_signals(state: Any, here: Variables, per_r: Any, work: Any) -> None:
     """Keep the largest speeds of signals along any axis."""
     _, u, v, w, p, _ = here
+    # |u| + c, the fastest wave of the Euler equations (Toro, section 3.1).
     most = larger(larger(size(u), size(v)), size(w))
     signal = most + root(fill(state, GAMMA) * p * per_r)
     store(work, lanes_at(state), larger(signal, load(work, lanes_at(state))))

@@ -59,14 +59,18 @@ def _add_step(
         now, before = overpressure[n], load[_NOW]
         if now == 0.0 and before == 0.0:
             continue
+        # 1. Time and integral of the step: the midpoint rule for means over steps, else trapezoids.
         at = time_s - 0.5 * step_s if is_mean else time_s
         part = step_s * (now if is_mean else 0.5 * (before + now))
+        # 2. Arrival: where the line between two steps crosses the threshold.
         if isnan(load[_ARRIVAL]) and now >= threshold:
             load[_ARRIVAL] = at - step_s * (now - threshold) / (now - before)
+        # 3. The running integral; its maximum is the peak specific impulse.
         load[_NET] += part
         if load[_NET] > load[_IMPULSE]:
             load[_IMPULSE] = load[_NET]
             load[_IMPULSE_TIME] = time_s
+        # 4. The steepest rise, which is the middle of a front smeared over cells, and the peak.
         if (now - before) / step_s > load[_RISE]:
             load[_RISE] = (now - before) / step_s
             load[_RISE_TIME] = at - 0.5 * step_s
@@ -184,6 +188,7 @@ class PatchHistories:
 
     def record(self, solver: Gas, step_s: float) -> None:
         """Add a step: the mean over its time, at its midpoint."""
+        # The wall took the momentum of this flux; still air presses on it from behind.
         over = solver.wall_pressure[self._members] - 1.0
         sums = np.bincount(self._patch, weights=self._share * over, minlength=len(self.faces))
         self._times.append(solver.time_s - 0.5 * step_s)
@@ -234,6 +239,8 @@ def positive_phases(
         overpressure_pa: Overpressures at these times (steps,).
         arrival_pa: Overpressure at which a wave has arrived.
     """
+    # Trapezoids. The first phase ends where the overpressure first falls to 0 after the arrival, as
+    # t_o of an ideal blast wave does (UFC 3-340-02, figure 2-2).
     parts = np.diff(time_s) * 0.5 * (overpressure_pa[1:] + overpressure_pa[:-1])
     arrived = np.flatnonzero(overpressure_pa >= arrival_pa)
     after = np.flatnonzero(overpressure_pa <= 0.0)
@@ -359,6 +366,7 @@ class FieldMap:
                 values[:, :, layer] for values in (self._peak, self._net, self._impulse)
             )
             np.maximum(peak, over, out=peak)
+            # Trapezoids, as a gauge in each cell adds them.
             net += np.float32(0.5 * step_s) * (over + self._now[:, :, layer])
             np.maximum(largest, net, out=largest)
             self._now[:, :, layer] = over

@@ -182,6 +182,7 @@ class RadialProfile:
 
     def scaled(self, mass: float) -> "RadialProfile":
         """Return the same profile for a charge of `mass` times the mass, at its scaled time."""
+        # Hopkinson and Cranz: lengths and times grow as the cube root of the mass, at equal states.
         length = cbrt(mass)
         return RadialProfile(
             self.time_s * length, self.front_m * length, self.shell_m * length, self.state
@@ -189,6 +190,8 @@ class RadialProfile:
 
     def totals(self) -> Floats:
         """Return mass, energy and fuel in excess of still air, kg, J and kg (3,)."""
+        # Volumes of shells, 4/3 pi (r_out^3 - r_in^3); still air is taken off, so that shells
+        # beyond the front add nothing.
         edges = self.shell_m * np.arange(self.state.shape[1] + 1.0)
         volumes = 4.0 / 3.0 * pi * np.diff(edges**3)
         still = np.array([AIR_DENSITY_KG_M3, AIR_PRESSURE_PA / (GAMMA - 1.0), 0.0])

@@ -57,6 +57,7 @@ class SphericalStage:
 
     def impulses_pa_s(self, distance_m: ArrayLike) -> tuple[Floats, Floats]:
         """Return the running impulses at the end of the stage and their maxima in it, Pa s."""
+        # Left sums: each overpressure holds until the next time, the last one until the end.
         step_s = np.diff(self.time_s, append=self.end_s)
         running = np.cumsum(step_s[:, np.newaxis] * self.overpressure_pa, axis=0)
         return (
@@ -76,7 +77,9 @@ def spherical_stage(charge: GasCharge, radius_m: float) -> SphericalStage:
         charge: The charge.
         radius_m: Radius of the front at which the grid takes over.
     """
+    # 1. The blast at the time when the grid takes over: where its front is, and when.
     profile = charge.profile(radius_m)
+    # 2. The same blast once more, recorded between the surface of the charge and that front.
     surface_m = charge.least_radius_m * (1.0 + 1e-9)
     radii = np.linspace(surface_m, max(profile.front_m, surface_m), _RADII)
     blast = charge.explosive.in_free_air(charge.free_air_kg, radii)

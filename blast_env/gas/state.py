@@ -49,6 +49,7 @@ def lift(state: Any, cells: int, first: int, notes: Any) -> None:
     """
     called_rarely()
     for at in range(first, first + lanes_at(state)):
+        # 1. Density: momentum falls or rises with it, so that the velocity stays.
         r, motion = get(state, DENSITY * cells + at), 0.0
         slower = FLOOR / r if r > 0.0 else 0.0
         is_thin = not r >= FLOOR
@@ -61,6 +62,7 @@ def lift(state: Any, cells: int, first: int, notes: Any) -> None:
         if is_thin:
             put(state, DENSITY * cells + at, FLOOR)
             r = FLOOR
+        # 2. Pressure, from the energy that is not motion.
         # A little more than the floor, or rounding leaves the pressure below it.
         least = 1.01 * FLOOR / (GAMMA - 1.0) + 0.5 * motion / r
         is_cold = not get(state, ENERGY * cells + at) >= least
@@ -76,6 +78,7 @@ def burn(state: Reals, extent: Extent, share: Any, heat: Any) -> None:
     for z in range(extent.shape[0]):
         for y in range(extent.shape[1]):
             for x in range(extent[z, y, 0], extent[z, y, 1]):
+                # The share is 1 - exp(-dt / tau): first-order decay, exact for any step.
                 burnt = share * state[FUEL, z, y, x]
                 state[FUEL, z, y, x] -= burnt
                 state[ENERGY, z, y, x] += heat * burnt
@@ -98,6 +101,7 @@ def cool(state: Reals, extent: Extent, hottest: Any) -> None:
                 motion = zero
                 for k in range(X_MOMENTUM, ENERGY):
                     motion += state[k, z, y, x] * state[k, z, y, x]
+                # p / rho is the temperature: at the same pressure, more mass is as much colder.
                 pressure = gamma_1 * (state[ENERGY, z, y, x] - half * motion / density)
                 state[DENSITY, z, y, x] = max(density, pressure / hottest)
 
@@ -117,6 +121,8 @@ def fastest_signal(state: Reals) -> float:
                 v = state[Y_MOMENTUM, z, y, x] / density
                 w = state[Z_MOMENTUM, z, y, x] / density
                 inner = state[ENERGY, z, y, x] / density - 0.5 * (u * u + v * v + w * w)
+                # c^2 = gamma p / rho, with p / rho = (gamma - 1) e of the inner energy e (Toro,
+                # section 3.1).
                 sound = sqrt(GAMMA * (GAMMA - 1.0) * inner)
                 fastest = max(fastest, max(abs(u), abs(v), abs(w)) + sound)
     return fastest
@@ -134,6 +140,7 @@ def widen(extent: Extent, whole: Extent, axis: int) -> None:
         axis: The axis, 0 for x.
     """
     planes, rows = extent.shape[0], extent.shape[1]
+    # Along x: one more cell at both ends of each row.
     if axis == 0:
         for z in range(planes):
             for y in range(rows):
@@ -141,6 +148,7 @@ def widen(extent: Extent, whole: Extent, axis: int) -> None:
                     extent[z, y, 0] = max(extent[z, y, 0] - 1, whole[z, y, 0])
                     extent[z, y, 1] = min(extent[z, y, 1] + 1, whole[z, y, 1])
         return
+    # Along y and z: the union of each row with the rows on both sides.
     # The rows before are extended already: keep what they were, a row or a plane of them.
     before = np.zeros((rows if axis == 2 else 1, 2), dtype=np.int32)
     for z in range(planes):
@@ -241,6 +249,7 @@ def merge(
         x_start: The same along x.
     """
     real = coarse.dtype.type
+    # Means of conserved variables over the air of a larger cell, summed in double precision.
     sums = np.zeros(len(coarse))
     for i in range(MARGIN, coarse.shape[1] - MARGIN):
         for j in range(MARGIN, coarse.shape[2] - MARGIN):

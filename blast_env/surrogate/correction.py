@@ -46,6 +46,9 @@ class Correction:
             barriers: Pieces of each layout, from `SurrogateSite.barrier`.
             errors: Logarithm of the simulated over the predicted load (layouts,).
         """
+        # Simple kriging of errors e less their mean (Rasmussen & Williams, Gaussian Processes for
+        # Machine Learning, 2006, section 2.2). (1) The covariance K of all pairs, with the variance
+        # of single layouts on its diagonal; (2) the weights K^-1 e.
         met = stacked(barriers)
         length_m3 = max(float(np.mean(_volume_m3(met))), 1.0)
         covariance = np.exp(-_all_apart_m3(met, met) / length_m3)
@@ -57,6 +60,8 @@ class Correction:
 
     def expected(self, barriers: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return mean and standard deviation of the error for each layout (layouts,)."""
+        # Equations 2.25 and 2.26: mean k^T K^-1 e, variance 1 - k^T K^-1 k in units of the spread,
+        # where k are the covariances with the simulated layouts.
         alike = np.exp(-_all_apart_m3(stacked(barriers), self.barriers) / self.length_m3)
         known = np.einsum("ln,nm,lm->l", alike, self.inverse, alike)
         left = np.sqrt(np.maximum(1.0 - known, 0.0))
@@ -70,6 +75,8 @@ def apart_m3(one: FloatArray, others: FloatArray) -> FloatArray:
         one: Left, bottom, right, top and height of each piece, m (pieces, 5).
         others: The same of each other barrier (others, pieces, 5).
     """
+    # |A| + |B| - 2 |A and B|. Pieces of one layout do not overlap, so that the volumes which each
+    # piece shares with the others add up.
     low = np.maximum(one[:, np.newaxis, :2], others[:, np.newaxis, :, :2])
     high = np.minimum(one[:, np.newaxis, 2:4], others[:, np.newaxis, :, 2:4])
     sides_m = np.maximum(high - low, 0.0)

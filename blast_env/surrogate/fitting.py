@@ -125,6 +125,7 @@ class Samples:
         rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
+        # 1. Each site once; each blast once, with the features of all points of its walls.
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
         features, related, area_m2, impulses, peaks = [], [], [], [], []
         wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
@@ -138,6 +139,7 @@ class Samples:
             of_points = approach.features(barrier).astype(np.float32)
             of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
             names = [structure.name for structure in site.protected]
+            # 2. Of these, the points of each protected structure: a sample.
             for *_, structure in loads:
                 own = approach.points_of(names.index(structure))
                 features.append(of_points[own])
@@ -145,6 +147,7 @@ class Samples:
                 area_m2.append(approach.area_m2[own])
                 impulses.append(approach.log_impulse[own])
                 peaks.append(approach.log_peak[own])
+        # 3. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         return cls(
             features=np.concatenate(features),
@@ -199,6 +202,7 @@ def fit(
         device: Device of torch; the fit depends on it by rounding.
         begun: The surrogate that the fit goes on from, and what that one was fitted to.
     """
+    # 1. Inputs are scaled by the data of the first fit, which a fit that goes on must keep.
     old = np.zeros(len(samples), dtype=bool) if begun is None else begun.samples
     if begun is None:
         mean, scale = _scales(samples, chosen)
@@ -206,6 +210,8 @@ def fit(
         mean, scale = begun.surrogate.mean, begun.surrogate.scale
     own, again = (_cases(samples, chosen & mask) for mask in (~old, old))
     tensors = _Tensors.of(samples, mean, scale, device)
+    # 2. One network for each kind of load and seed: an ensemble, whose spread tells where it does
+    # not know (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017).
     tasks = []
     for loads, kind in ((samples.impulse, "impulse"), (samples.peak, "peak"))[: 1 + peaks]:
         for number in range(members):
@@ -218,6 +224,7 @@ def fit(
     def fitted(task: tuple["_Network", "_Target", int]) -> Member:
         return _fitted(tensors, own, again, epochs, *task)
 
+    # 3. Two at a time, since torch leaves the interpreter to others while it multiplies.
     with ThreadPoolExecutor(2) as pool:
         found = [*pool.map(fitted, tasks)]
     impulse, peak = found[:members], found[members:]
@@ -325,6 +332,8 @@ def predictions(
     counts, solids = samples.counts[chosen], samples.solids[chosen]
     points = np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
+    # 1. What each solid says to each point; 2. the sum over the solids, sample by sample; 3. the
+    # loads of points, and their mean over each structure.
     messages = networks.messages(
         surrogate.related(samples.relations[np.repeat(chosen, samples.counts * samples.solids)])
     )
@@ -344,6 +353,8 @@ def predictions(
 def errors_of(found: Predictions, target: FloatArray, cases: np.ndarray) -> Errors:
     """Compare predictions with logarithms of simulated loads (samples,)."""
     guess = found.log_load
+    # Errors of logarithms are relative errors. Those common to a case do not change which of its
+    # layouts is the best.
     off = guess - target
     ranks, lost, within = [], [], np.zeros_like(off)
     for case in np.unique(cases):
@@ -352,6 +363,7 @@ def errors_of(found: Predictions, target: FloatArray, cases: np.ndarray) -> Erro
         true = target[own]
         if own.sum() >= _LEAST_CASE and np.ptp(true) > 0.0:
             ranks.append(float(spearmanr(guess[own], true).statistic))
+            # Loads relative to the worst layout; what is lost by taking the predicted best one.
             shares = np.exp(true - true.max())
             lost.append(float(shares[guess[own].argmin()] - shares.min()))
     return Errors(
@@ -443,6 +455,7 @@ class _Tensors:
 
         The mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
         """
+        # A common error of all layouts of a case ranks none of them, so it counts less.
         errors = self._errors(network, target, np.concatenate(groups))
         parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
         common = torch.cat([part.mean().expand(len(part)) for part in parts])
@@ -450,10 +463,12 @@ class _Tensors:
 
     def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
         """Return the errors of the logarithm on some samples (samples,)."""
+        # 1. The rows of the points and of the relations of the samples, one sample after the other.
         counts, solids, device = self.counts[numbers], self.solids[numbers], self.area_m2.device
         points = torch.from_numpy(_runs_of(self.starts[numbers], counts)).to(device)
         related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
         begin = np.cumsum([0, *counts[:-1]])
+        # 2. Each solid speaks to all points of its sample.
         hearing = [
             np.tile(np.arange(first, first + count), number)
             for first, count, number in zip(begin, counts, solids, strict=True)
@@ -463,6 +478,7 @@ class _Tensors:
             self.relations[related.to(device)],
             torch.from_numpy(np.concatenate(hearing)).to(device),
         )
+        # 3. The load of a structure: the power mean of its points, by area.
         owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts)).to(device)
         logs = target.power * (target.known[points] + over)
         empty = torch.zeros(len(numbers), device=device)
@@ -500,6 +516,8 @@ class _Network(nn.Module):
             relations: Relations of solids to points (rows, RELATIONS).
             hearing: Index of the point of each of these rows (rows,).
         """
+        # (1) Each solid sends a message to each point; (2) their sum does not depend on their order
+        # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sum give the load.
         silu = nn.functional.silu
         messages = silu(self.message(silu(self.send(relations))))
         heard = features.new_zeros(len(features), MESSAGE).index_add(0, hearing, messages)
@@ -532,13 +550,18 @@ def _fitted(
 ) -> Member:
     """Fit one network to the samples of some cases, and to some of those that it has met."""
     rng = np.random.default_rng(seed)
+    # 1. Cases in groups of a few samples; those of an earlier fit in part, and more slowly.
     groups, met = _groups(cases, rng), _groups(again, rng)
     drawn, new = len(met) // _AGAIN, np.arange(len(groups))
     rate = _RATE / _AGAIN if met else _RATE
     groups += met
+    # 2. AdamW (Loshchilov & Hutter, ICLR 2019), with a rate that rises and falls once (Smith &
+    # Topin, Super-convergence, 2019).
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=_DECAY)
     batches = max(1, round((len(new) + drawn) / _BATCH))
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=epochs * batches)
+    # 3. Passes over all groups, in a new order each time; gradients are clipped, because a few
+    # groups are outliers (Pascanu, Mikolov & Bengio, ICML 2013).
     for epoch in range(epochs):
         shown = new
         if met:

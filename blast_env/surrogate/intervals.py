@@ -39,6 +39,9 @@ def interval_factor(
             f"{len(counts)} sites are too few for intervals of {coverage:g}: it takes at least "
             f"{least_sites(coverage)}"
         )
+    # Split conformal prediction. (1) The score of a load is its error in spreads; (2) each site has
+    # the weight 1, spread over its loads; (3) the interval takes in the scores up to the weight c
+    # (n + 1): the new site is one of n + 1 alike ones.
     ratios = np.abs(errors) / spreads
     order = np.argsort(ratios)
     weight = np.cumsum(1.0 / counts[site][order])
@@ -48,6 +51,7 @@ def interval_factor(
 
 def least_sites(coverage: float = COVERAGE) -> int:
     """Return the least number of sites that set an interval of such a coverage."""
+    # The quantile c (n + 1) must not exceed n.
     return int(np.ceil(coverage / (1.0 - coverage) - 1e-9))
 
 
@@ -68,6 +72,7 @@ def covered(
         coverage: As in `interval_factor`.
     """
     inside = np.zeros(len(errors), dtype=bool)
+    # Each fold in turn is new: its interval is set by the others.
     for own in held_out:
         factor = interval_factor(errors[~own], spreads[~own], sites[~own], coverage)
         inside[own] = np.abs(errors[own]) <= factor * spreads[own]

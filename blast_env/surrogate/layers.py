@@ -40,6 +40,8 @@ _HALF: Final = np.float32(0.5)
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _silu(at: Any, value: Any) -> Any:
     """Return x / (1 + exp(-x)) of a vector, by the hyperbolic tangent of x / 2."""
+    # x / (1 + exp(-x)) = h + h tanh(h) with h = x / 2: the hyperbolic tangent saturates, where the
+    # exponential would overflow. Both polynomials by Horner's rule, which fuses.
     half = fill(at, _HALF) * value
     most = fill(at, _MOST)
     near = smaller(larger(half, fill(at, -_MOST)), most)
@@ -70,6 +72,8 @@ def four_rows(
         bases: The first entry of each row in it (4,).
         total: Place of the outputs of the rows.
     """
+    # Each weight is loaded once for four rows: two vectors of outputs of each are eight sums, which
+    # stay in registers beside the weights.
     lanes = lanes_at(total)
     row_1, row_2, row_3 = inputs, 2 * inputs, 3 * inputs
     base_0, base_1, base_2, base_3 = bases

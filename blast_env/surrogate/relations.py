@@ -50,6 +50,7 @@ def solid_relations(
     """
     found = np.zeros((len(solids), len(points_m), RELATIONS))
     for point in range(len(points_m)):
+        # 1. The axes of a point: ahead along the path in plan, aside to where its wall faces.
         x_m, y_m = points_m[point, 0] - start_m[0], points_m[point, 1] - start_m[1]
         way_m = hypot(x_m, y_m) + 1e-6
         ahead_x, ahead_y = x_m / way_m, y_m / way_m
@@ -57,6 +58,8 @@ def solid_relations(
         if outward[point, 0] * aside_x + outward[point, 1] * aside_y < 0.0:
             aside_x, aside_y = -aside_x, -aside_y
         for solid in range(len(solids)):
+            # 2. Centre and half extents of a solid along these axes; a turned rectangle reaches as
+            # far as its corners.
             left, bottom, right, top, height_m = solids[solid]
             from_x, from_y = 0.5 * (left + right) - start_m[0], 0.5 * (bottom + top) - start_m[1]
             half_x, half_y = 0.5 * (right - left), 0.5 * (top - bottom)
@@ -64,11 +67,13 @@ def solid_relations(
             aside_m = aside_x * from_x + aside_y * from_y
             half_ahead_m = abs(ahead_x) * half_x + abs(ahead_y) * half_y
             half_aside_m = abs(aside_x) * half_x + abs(aside_y) * half_y
+            # 3. Where it is abreast of the path, and how high the straight path is there.
             there_m = min(max(ahead_m, 0.0), way_m)
             straight_m = start_m[2] + there_m / way_m * (points_m[point, 2] - start_m[2])
             from_charge_m = _away_m(start_m[0], start_m[1], solids[solid])
             from_point_m = _away_m(points_m[point, 0], points_m[point, 1], solids[solid])
             crosses = ahead_m + half_ahead_m > 0.0 and ahead_m - half_ahead_m < way_m
+            # 4. The relations in their order, scaled and bounded: far solids are all alike.
             own = found[solid, point]
             own[0] = ahead_m / way_m
             own[1] = ahead_m / scale_m

@@ -91,6 +91,8 @@ class WallPoints:
 
 def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArray:
     """Return position, outward normal, area, and distances to edge and roof (points, 8)."""
+    # 1. Levels of points over the height; 2. along each wall, points in the middle of equal parts,
+    # in the air before it.
     left, bottom, right, top = structure.rectangle_m
     rise_m = height_m - structure.base_m
     levels = max(1, round(rise_m / (_UP_M * apart)))
@@ -300,6 +302,7 @@ class SurrogateSite:
         return (*rectangle_m, ground_below_m(terraces, rectangle_m) + own_m)
 
     def _approach_of(self, charge: Charge) -> Approach:
+        # 1. Distances, and the cosine of the angle between the ray and the normal in plan.
         points = self._points
         start_m = np.array((*charge.position_m, max(charge.height_m, _LEAST_HEIGHT_M)))
         away_m = start_m - points.points_m
@@ -307,6 +310,7 @@ class SurrogateSite:
         scale = float(np.cbrt(charge.tnt_kg))
         facing = (away_m[:, :2] * points.outward).sum(axis=1) / distance_m
         ways = Ways.between(start_m, points.points_m, charge.tnt_kg, self._solids)
+        # 2. What each point knows of itself, in scaled lengths (Hopkinson & Cranz).
         geometry = np.stack(
             (
                 np.log(distance_m / scale),
@@ -319,6 +323,8 @@ class SurrogateSite:
             ),
             axis=1,
         )
+        # 3. Loads in the open that the networks correct; the curves begin at a least scaled
+        # distance.
         met_m = np.maximum(distance_m, _LEAST_Z * scale)
         impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
         peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
@@ -338,6 +344,7 @@ class SurrogateSite:
 
 def _in_lines(boxes: Sequence[Rectangle]) -> list[Rectangle]:
     """Return boxes with those side by side as one, along x or along y: as few as possible."""
+    # One direction at a time: a corner belongs to either of its walls.
     return min((_lines(boxes, along) for along in (0, 1)), key=len)
 
 
@@ -355,6 +362,7 @@ def _lines(boxes: Sequence[Rectangle], along: int) -> list[Rectangle]:
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
     """Return the factor on the spacing of points that keeps their number near `MOST_POINTS`."""
+    # Points are per area: their number falls with the square of their distance.
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
         area_m2 += height_m * sum(length_m for length_m, *_ in _walls(structure))

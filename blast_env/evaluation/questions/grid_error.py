@@ -85,14 +85,17 @@ class GridError:
         It is for the layout in question unless that is named, and for the charge that governs of
         those with coarser cells, unless its number is given.
         """
+        # 1. The charges with both sizes of cells.
         coarse, name = blasts.coarse, name or blasts.judged
         if coarse is None:
             return None
         numbers = [k for k, own in enumerate(blasts.threats) if own in coarse.threats]
         if not numbers or number not in (None, *numbers):
             return None
+        # 2. Of these the one that governs, unless another is asked for.
         if number is None:
             number = numbers[blasts.under(numbers).worst(name)]
+        # 3. Both sizes, each with the layout and without a barrier.
         threat = blasts.threats[number]
         fine_m, coarse_m = (part.engine.smallest_m for part in (blasts, coarse))
         return cls(
@@ -124,6 +127,7 @@ class GridError:
         return self._share(1, number_of)
 
     def _share(self, side: int, number_of: NumberOf) -> float:
+        # As a share of the load, which carries over to means over all charges.
         fine, coarse = number_of(self.fine[side]), number_of(self.coarse[side])
         return convergence_index(fine, coarse, self.ratio) / fine if fine > 0.0 else nan
 

@@ -98,8 +98,10 @@ def _structure_row(
     def impulse_of(record: BlastRecord) -> float:
         return load_of(record).impulse_pa_s
 
+    # 1. The reduction: of the means over the threats, with its interval over them.
     impulses = [np.array([load.impulse_pa_s for load in own]) for own in (loads, without)]
     reduction = reduction_estimate(*impulses)
+    # 2. The grid error, of the worst threat; that of loads as shares.
     errors, of_reduction = (np.nan, np.nan), np.nan
     if error is not None:
         errors = error.of_load(impulse_of), error.of_unprotected(impulse_of)
@@ -116,6 +118,7 @@ def _structure_row(
         "validation": worst.status.label,
         "reason": worst.reason,
     }
+    # 3. Both sides: the shares of the error now times the mean loads.
     both = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
     for side, own, impulse, off in both:
         mean_pa_s = float(impulse.mean())
@@ -285,6 +288,8 @@ class Evaluation:
     @cached_property
     def reduction(self) -> Estimate:
         """The mean reduction with its 95 % interval."""
+        # One case: its threats are the sample, as pairs with and without the barrier. Several
+        # cases: each has one reduction, and the cases are the sample.
         if self._has_one_case and self._is_mean:
             return reduction_estimate(self.loads[0], self.unprotected[0])
         if self._has_one_case:
@@ -319,6 +324,8 @@ class Evaluation:
         """Grid error of the reduction, as under the worst threat; NaN without one."""
         if self.grid_error is None:
             return np.nan
+        # A number of one blast as the objective values it: the error of a mean is that of its worst
+        # part.
         own = next(part for part in self.every if part.coarse is not None)
 
         def value_of(record: BlastRecord, layout: Layout = ()) -> float:

@@ -150,6 +150,8 @@ class BuildingResponse:
 
         Histories with sharper peaks have the same impulse.
         """
+        # Cells clip peaks and keep impulses. Which of both histories is worse depends on the period
+        # of the component, so both are computed, and the worse one counts.
         found = self.on_cells
         if self.peak_factor <= 1.0:
             return found
@@ -530,9 +532,11 @@ def response_to(
     scenario: Scenario, layout: Layout, charge: Charge, record: BlastRecord
 ) -> Consequences:
     """Return the consequences of one blast with the charge at its place; see `consequences_of`."""
+    # 1. The layout as it stood in the last run: pieces that overturned are gone.
     details = record.complete
     placed = tuple(own for own in load_relevant(layout) if own not in record.taken_away)
     responses: list[BuildingResponse] = []
+    # 2. The bays, whose components move under the recorded histories: no new blast.
     if record.bays:
         bays = {part.bay.name: part for part in scenario.bays_with(layout)}
         if not bays.keys() >= {*record.bays}:
@@ -540,6 +544,7 @@ def response_to(
         facade = respond([bays[bay] for bay in record.bays], record.time_s, record.pressure_pa)
         site = build_site(scenario, placed, 0, charge)
         responses = by_building(scenario, facade, site, details.peak_factor, details.known)
+    # 3. Neighbours without a facade by probits, the barrier by its own movements.
     assert record.pieces is not None
     return Consequences(
         tuple(responses),
@@ -565,6 +570,7 @@ def by_building(
     stepped = stepped_buildings(scenario.structures)
     owners = [names[bay.bay.structure] for bay in facade.bays]
     found = []
+    # A building responds by itself: its parts may be several structures.
     for building in dict.fromkeys(owners):
         own = np.flatnonzero(np.array([owner == building for owner in owners]))
         part = respond(
@@ -581,6 +587,9 @@ def by_building(
 def side_on_peak_pa(reflected_pa: FloatArray) -> FloatArray:
     """Return the side-on peaks, Pa, whose normal reflections have given peaks (n,)."""
     reflected = np.asarray(reflected_pa, dtype=np.float64)
+    # Normal reflection in air by the jump conditions of Rankine and Hugoniot with gamma = 1.4: p_r
+    # = 2 p_s (7 p_0 + 4 p_s) / (7 p_0 + p_s), the positive root of 8 p_s^2 + (14 p_0 - p_r) p_s - 7
+    # p_0 p_r = 0.
     linear = 14.0 * _AMBIENT_PA - reflected
     root = np.sqrt(linear**2 + 224.0 * _AMBIENT_PA * reflected)
     return np.asarray((root - linear) / 16.0)
@@ -588,6 +597,8 @@ def side_on_peak_pa(reflected_pa: FloatArray) -> FloatArray:
 
 def side_on_impulse_pa_s(reflected_pa_s: FloatArray) -> FloatArray:
     """Return the side-on impulses, Pa s, whose normal reflections have given impulses (n,)."""
+    # A wall doubles a weak wave. It more than doubles a strong one, so that half is too much and on
+    # the safe side.
     return 0.5 * np.asarray(reflected_pa_s, dtype=np.float64)
 
 
