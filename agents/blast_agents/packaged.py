@@ -22,7 +22,7 @@ from safetensors.numpy import load, save
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.by_rule import layouts_by_rule
-from blast_env.design.search.learnt import Guesses, case_for, improved
+from blast_env.design.search.learnt import Guesses, SurrogateSearch, case_for, improved
 from blast_env.design.search.package import LEAST_GAIN, proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
@@ -31,7 +31,7 @@ from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.batch import LayoutBatch, PlacementRules
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
-from blast_env.surrogate import packaged_surrogate
+from blast_env.surrogate import Surrogate, packaged_surrogate
 from blast_env.values import generator, whole_number
 
 Weights = Mapping[str, NDArray[np.float32]]
@@ -345,3 +345,16 @@ class AgentProposer:
             f"{self.draws} draws and changes of them"
         )
         return replace(proposed(problem, layout, by), method=self.name, budget=budget, seed=seed)
+
+
+def search_from_agent(surrogate: Surrogate | None = None) -> SurrogateSearch:
+    """Return the search `surrogate`, begun with the packaged agent's layouts.
+
+    With blasts, the first goes to the agent's proposal, and the search by guesses that chooses the
+    next ones starts from its draws, too. Without, it proposes the best guess among them.
+
+    Args:
+        surrogate: The surrogate; the packaged one unless given.
+    """
+    found, agent = surrogate or packaged_surrogate(), packaged_agent()
+    return SurrogateSearch(found, agent, digest=f"{found.digest} {agent.digest}")

@@ -33,6 +33,7 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark import judge as judge_submission
 from blast_env.benchmark.judging import read_submission
+from blast_env.cli.agents import AGENT, SURROGATE, agent_without_blasts, surrogate_search
 from blast_env.cli.command import writes
 from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
 from blast_env.cli.output import print_outcome, print_written, progress_bar, resumable
@@ -81,8 +82,8 @@ def judge(
     ),
     method: list[str] = typer.Option(
         [],
-        help="Run this method first; may be given again: the name of a search or rule, `rules` for "
-        "all that suit, or your own as module:object.",
+        help="Run this method first; may be given again: the name of a search or rule, `agent` for "
+        "the packaged agent, `rules` for all that suit, or your own as module:object.",
     ),
     run: list[Path] = typer.Option(
         [], help="Run folder of a trained agent, as a further method; may be given again."
@@ -172,11 +173,20 @@ def _methods(
 ) -> Iterator[tuple[str, Method, Sequence[int]]]:
     """Yield names, methods and their budgets."""
     with import_extra("agents", "--method"):
-        from blast_env.benchmark.methods import entries, method_of
+        from blast_env.benchmark.methods import budgets_of, entries, method_of
+        from blast_env.surrogate import packaged_surrogate
     here = str(Path.cwd())
     if names and here not in sys.path:
         sys.path.insert(0, here)  # for module:object
-    yield from entries(names, asked, [definition.scenario for definition in definitions.values()])
+    sites = [definition.scenario for definition in definitions.values()]
+    for name in names:
+        if name == AGENT:
+            yield name, method_of(agent_without_blasts()[0]), (0,)
+        elif name == SURROGATE:
+            search = surrogate_search(packaged_surrogate())[0]
+            yield name, method_of(search), budgets_of(name, asked)
+        else:
+            yield from entries([name], asked, sites)
     if runs:
         with import_extra("agents", "trained agents"):
             from blast_agents.training import load_agent

@@ -14,6 +14,13 @@ import typer
 from blast_env.answers.document import percent
 from blast_env.answers.search import SearchRun, judged_answer, proposal_words, search_answer
 from blast_env.answers.terminal import print_line, print_parts
+from blast_env.cli.agents import (
+    AGENT,
+    SURROGATE,
+    Digests,
+    agent_without_blasts,
+    surrogate_search,
+)
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     SCENARIO_HELP,
@@ -58,7 +65,7 @@ from blast_env.design.search.by_rule import DEFAULT_BUDGET, ProposerKind
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.registry import check_suits, proposer_row
 from blast_env.envs.episode import find_risk
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     Evaluation,
     Evaluators,
@@ -88,12 +95,8 @@ if TYPE_CHECKING:
 ThreatName = Literal["visible", "hidden"]
 
 PACKAGE: Final = PackageProposer().name
-AGENT: Final = "agent"
-"""The packaged agent, which this package knows by the command line alone."""
-
 _WITHOUT_BLASTS: Final = (PACKAGE, AGENT)
 _METHOD_HELP: Final = f"{', '.join((*proposers(), AGENT))}. package and agent run no blast."
-_SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
 
@@ -200,7 +203,7 @@ def search(
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)
-        proposer, digest = _method(method, site, start_from, surrogate)
+        proposer, digests = _method(method, site, start_from, surrogate)
         own_width = threads_now if width is None else width
         known = None if threat == "hidden" else _known_charge(site, given, seed)
         own_risk = find_risk(risk, CVAR_LEVEL)
@@ -216,7 +219,7 @@ def search(
         checked = _check(run, held_out, is_hidden=threat == "hidden")
         print_parts(search_answer(run, checked))
         if out is not None:
-            options = _options(context, run, digest) | {"width": own_width}
+            options = _options(context, run, digests) | {"width": own_width}
             _write_search(run, options, checked, out)
     if run.result.interrupted:
         raise InterruptedCommandError(
@@ -245,33 +248,33 @@ def _known_charge(scenario: Scenario, given: ChargeInput, seed: int) -> AnyCharg
     return given.fixed(scenario, scenario.sample_charge(np.random.default_rng(seed)))
 
 
-def _options(context: typer.Context, run: SearchRun, digest: str | None) -> dict[str, Any]:
+def _options(context: typer.Context, run: SearchRun, digests: Digests) -> dict[str, Any]:
     """Return the options that the layout follows from."""
     options = {
         name: [*map(str, parameter)] if name == "start_from" else parameter
         for name, parameter in context.params.items()
         if name not in _NOT_OF_THE_SEARCH
     }
-    return options | {"budget": run.result.budget, "surrogate": digest}
+    return options | {"budget": run.result.budget, SURROGATE: None, **digests}
 
 
 def _method(
     name: str, scenario: Scenario, start_from: Sequence[Path], surrogate: Path | None
-) -> tuple[Proposer, str | None]:
-    """Return the method, and the digest of its surrogate if it has one."""
-    if surrogate is not None and name != _SURROGATE:
-        raise BlastEnvError(f"--surrogate is for --method {_SURROGATE}, not {name}")
+) -> tuple[Proposer, Digests]:
+    """Return the method, and the digests of what it goes by."""
+    if surrogate is not None and name != SURROGATE:
+        raise BlastEnvError(f"--surrogate is for --method {SURROGATE}, not {name}")
     proposer_row(name)  # refuses an unknown one
     check_suits(name, scenario)
     initial = tuple(load_layout(path, scenario) for path in start_from)
-    if name != _SURROGATE or initial:
-        return find_proposer(name, initial), None
+    if name != SURROGATE or initial:
+        return find_proposer(name, initial), {}
     # Here, because it takes half a second to import.
-    from blast_env.design.search.learnt import search_by
     from blast_env.surrogate import load_surrogate, packaged_surrogate
 
-    guessing = packaged_surrogate() if surrogate is None else load_surrogate(surrogate)
-    return search_by(guessing), guessing.digest
+    return surrogate_search(
+        packaged_surrogate() if surrogate is None else load_surrogate(surrogate)
+    )
 
 
 def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> SearchRun:
@@ -418,17 +421,13 @@ def _proposal_without_blasts(
     return problem, result.layout
 
 
-def _without_blasts(method: str) -> tuple[Proposer, dict[str, str]]:
+def _without_blasts(method: str) -> tuple[Proposer, Digests]:
     """Return a method that runs no blast, and the digests of what it goes by."""
     from blast_env.surrogate import packaged_surrogate  # takes half a second to import
 
-    digests = {"surrogate": packaged_surrogate().digest}
     if method == PACKAGE:
-        return PackageProposer(), digests
-    with import_extra("agents", "packaged agent"):
-        from blast_agents.packaged import AgentProposer, packaged_agent
-
-    return AgentProposer(), digests | {"agent": packaged_agent().digest}
+        return PackageProposer(), {SURROGATE: packaged_surrogate().digest}
+    return agent_without_blasts()
 
 
 def _given_charge(scenario: Scenario, given: ChargeInput) -> AnyCharge | None:

@@ -3,6 +3,7 @@
 `blast-env judge --method studies.benchmark.methods:NAME` plays one. Optuna and BoTorch are not
 dependencies: `pip install optuna botorch`. The agents train on guesses of the packaged surrogate
 alone, for the site and charges of the problem; the budget pays for layouts of the trained policy.
+Without one they propose the draw with the best guess.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,8 +17,9 @@ from stable_baselines3 import PPO
 
 from blast_env.arrays import FloatArray
 from blast_env.benchmark import BenchmarkProblem
+from blast_env.benchmark.methods import method_of
 from blast_env.design.search.by_rule import rule_layouts
-from blast_env.design.search.learnt import Guesses, improved
+from blast_env.design.search.learnt import Guesses, improved, packaged_search
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.evaluation import LoadCaseSet
 from blast_env.geometry import Layout
@@ -109,6 +111,11 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int) -> Layout:
             side = 0.8
         places = torch.cat([places, chosen[None]])
         values = torch.cat([values, torch.tensor([[found]], dtype=torch.float64)])
+
+
+def surrogate_alone(problem: BenchmarkProblem, seed: int) -> Layout:
+    """The search `surrogate` without layouts of the packaged agent."""
+    return method_of(packaged_search())(problem, seed)
 
 
 def ppo(problem: BenchmarkProblem, seed: int) -> Layout:
@@ -244,7 +251,9 @@ def _ranked(draws: Sequence[Guessed]) -> list[Guessed]:
 
 
 def _best_of(problem: BenchmarkProblem, draws: Sequence[Guessed]) -> Layout:
-    """Blast layouts until the budget ends; return the best."""
+    """Blast layouts until the budget ends; return the best. Without a budget, the best guess."""
+    if not problem.most_blasts:
+        return max(draws, key=lambda draw: draw[1])[0]
     for layout in dict.fromkeys(layout for layout, _ in draws):
         problem.evaluate(layout)
     assert problem.best is not None

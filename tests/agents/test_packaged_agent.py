@@ -1,12 +1,19 @@
 """The agent that comes with the package: one policy for any site."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from blast_agents import PackagedAgent, packaged_agent
-from blast_agents.packaged import AgentProposer, load_packaged, read_weights, write_weights
+from blast_agents.packaged import (
+    AgentProposer,
+    load_packaged,
+    read_weights,
+    search_from_agent,
+    write_weights,
+)
 from blast_agents.policies.candidates import Candidates
 from typer.testing import CliRunner
 
@@ -14,10 +21,10 @@ from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.design import expected_charge, random_layout
 from blast_env.design.proposal import problem_of
-from blast_env.design.search import Guesses, layouts_by_rule
+from blast_env.design.search import Guesses, layouts_by_rule, search_by
 from blast_env.design.search.package import LEAST_GAIN
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.layout import LayoutState, draw_threat, load_layout
 from blast_env.site import AnyCharge, Charge, Scenario
 from blast_env.sites import ItemSiteRanges, generate_site, kerb_site, turned
@@ -174,3 +181,17 @@ def test_the_command_writes_the_best_of_the_draws(tmp_path: Path) -> None:
     refused = CliRunner().invoke(app, ["search", *options, "--budget", "5"])
     assert refused.exit_code != 0
     assert "does not apply to --method agent" in refused.output
+
+
+def test_a_search_by_the_surrogate_starts_from_its_layouts() -> None:
+    """The first blast is its proposal's; without blasts the best guess is no worse than that."""
+    charge = draw_threat(CONTROL_ROOM, 0)
+    case = LoadCaseSet(CONTROL_ROOM, (LoadCase(charge),), charge=charge)
+    problem = DesignProblem(BlastEvaluator(CONTROL_ROOM, "surrogate"), case)
+    search = replace(search_from_agent(), guesses=40, changes=16)
+    assert search.digest != search_by(packaged_surrogate()).digest
+    proposed = tuple(sorted(packaged_agent().propose(CONTROL_ROOM, charge)))
+    assert search.propose(problem, 1, 0).layout == proposed
+    at_once = search.at_once(CONTROL_ROOM, charge)
+    loads = guesses_of(CONTROL_ROOM, charge).loads([at_once, proposed])
+    assert loads[0] <= loads[1]

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from blast_agents import packaged_agent
+from blast_agents.packaged import search_from_agent
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
-from blast_env.design.search import DesignProblem, find_proposer, search_by
+from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
@@ -77,7 +79,7 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
 
 
 def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
-    """That of the package, whose first guess gets the only blast."""
+    """That of the package; the only blast goes to what the packaged agent proposes."""
     scenario, out = wide_yard(tnt_kg=1.0), tmp_path / "out"
     save_scenario(scenario, tmp_path / "yard.toml")
     options = ("--engine", "gas", "--cell", 0.5, "--budget", 1, "--held-out", 1, "--out", out)
@@ -88,11 +90,12 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert "held out " not in result.stdout.replace("is held out", "")
     found, provenance = packaged_surrogate(), LayoutFile.load(out / "layout.json").provenance
     assert provenance["options"]["surrogate"] == found.digest
+    assert provenance["options"]["agent"] == packaged_agent().digest
     assert provenance["result"]["held_out_threats"] == 0
     assert provenance["result"]["held_out_reduction"] is None
     case = search_set(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
     problem = DesignProblem(BlastEvaluator(scenario, "gas"), case)
-    expected = search_by(found).propose(problem, 1, 0)
+    expected = search_from_agent(found).propose(problem, 1, 0)
     assert load_layout(out / "layout.json", scenario) == expected.layout != ()
 
 

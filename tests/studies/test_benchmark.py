@@ -79,3 +79,7 @@ def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.Mo
     assert 1 <= run.blasts <= 3
     assert run.layout == min(problem.history, key=lambda step: step.share).layout
     assert all(step.layout for step in problem.history)
+    free = make("control_room-known-v2", 0, engine=RowEngine())
+    (run,) = play(methods.imitation, [(lambda _: free, 0, 0)])
+    assert run.blasts == free.blasts == 0
+    assert run.layout

@@ -25,6 +25,7 @@ from blast_env.design.search import (
     improved,
     layouts_by_rule,
 )
+from blast_env.design.search.learnt import case_for
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
@@ -515,18 +516,27 @@ class Drawing:
 
 
 @pytest.mark.parametrize("charge", [None, Charge((1.5, 5.0), 5.0)], ids=["hidden", "known"])
-def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
+def test_of_what_rules_and_an_agent_propose_it_takes_what_the_surrogate_likes_best(
     charge: Charge | None,
 ) -> None:
-    surrogate, drawing = by_hand(), Drawing()
-    proposed = SurrogateSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
-    drawn = [tuple(sorted(layout)) for layout in drawing.sample(YARD, charge, 3)]
-    met = case() if charge is None else LoadCaseSet(YARD, (LoadCase(charge, 0),))
-    likes = Guesses.of(surrogate, met).loads([(), *drawn])
-    if charge is not None:
-        assert proposed == [(), *drawn][int(likes.argmin())]
-    assert proposed in drawn  # a wall is better than none
-    assert SurrogateSearch(surrogate, drawing, ranked=1).at_once(YARD, charge) == drawn[0]
+    """An agent that draws something better than all rules is followed, one of rules is not."""
+    surrogate = by_hand()
+    begin = [(), *layouts_by_rule(YARD, charge).values()]
+    guesses = Guesses.of(surrogate, case_for(YARD, charge))
+    best = improved(guesses, begin, 60, np.random.default_rng(1))[0]
+    alone, with_rules = (
+        SurrogateSearch(surrogate, agent, ranked=3, changes=0).at_once(YARD, charge)
+        for agent in (None, Drawing())
+    )
+    assert alone == with_rules != best
+
+    class Better(Drawing):
+        def sample(self, *_: object) -> list[Layout]:
+            return [best]
+
+    assert SurrogateSearch(surrogate, Better(), changes=0).at_once(YARD, charge) == best
+    changed = SurrogateSearch(surrogate, Better(), changes=16).at_once(YARD, charge)
+    assert guesses.loads([changed]) <= guesses.loads([best])
 
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:

@@ -133,7 +133,7 @@ class SurrogateSearch(Search):
 
     - with a surrogate, the best prediction among the rules' layouts and changes of them;
     - with an agent, the agent's layout;
-    - with both, the best prediction among the agent's layout and its samples.
+    - with both, the best prediction among these, the agent's samples and changes.
 
     With blasts, a surrogate selects the layouts to simulate: first the agent's layout, then in
     turn the rules' layouts and the best of a search by predictions alone, then changes of the best
@@ -151,7 +151,7 @@ class SurrogateSearch(Search):
         agent: The agent.
         digest: Digest of both, which identifies results.
         changes: Number of changed layouts to predict in a search without blasts.
-        ranked: Number of samples of the agent in a search without blasts.
+        ranked: Number of samples of the agent in a search without blasts, with a surrogate.
         guesses: Number of layouts to predict before the first blast.
         agent_draws: Number of samples of the agent among these.
         drawn: Number of changed layouts from which the surrogate selects one, afterwards.
@@ -218,17 +218,15 @@ class SurrogateSearch(Search):
             return tuple(sorted(_given(self.agent).propose(scenario, charge)))
         guesses = Guesses.of(self.surrogate, case_for(scenario, charge))
         tell(0.5 * _SITE_SHARE)
-        if self.agent is None:
-            begin_with = [(), *layouts_by_rule(scenario, charge).values()]
+        begin_with = [(), *layouts_by_rule(scenario, charge).values()]
+        if self.agent is not None:
+            drawn = self.agent.sample(scenario, charge, self.ranked, 0)
+            begin_with += [self.agent.propose(scenario, charge), *drawn]
 
-            def go_on(share: float) -> None:
-                tell(_SITE_SHARE + (1.0 - _SITE_SHARE) * share)
+        def go_on(share: float) -> None:
+            tell(_SITE_SHARE + (1.0 - _SITE_SHARE) * share)
 
-            return improved(guesses, begin_with, self.changes, generator(0), go_on)[0]
-        proposed = self.agent.propose(scenario, charge)
-        drawn = self.agent.sample(scenario, charge, self.ranked, 0)
-        guesses.loads([tuple(sorted(draw)) for draw in (proposed, *drawn)])
-        return guesses.ranked()[0]
+        return improved(guesses, begin_with, self.changes, generator(0), go_on)[0]
 
     def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Divide the blasts; with a surrogate and a hidden charge, favour threats over layouts."""
