@@ -183,7 +183,7 @@ class FeaturesEpisode(BatchObservation):
         if has_items:
             length += (2 + kinds) * rows * columns
         shows_vehicles = episodes[0].shows_vehicles
-        vectors = np.empty((len(episodes), length + shows_vehicles), dtype=np.float32)
+        vectors = placements.room((len(episodes), length + shows_vehicles))
         of_episodes = own, constants, variants, shares, legal, occupancy, has_items
         put_vectors(*of_episodes, _SHARES, _SITE, vectors)
         if shows_vehicles:

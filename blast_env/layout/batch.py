@@ -2,17 +2,23 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from sys import getrefcount
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.geometry import Element, Layout, Measure
+from blast_env.geometry import Element, Layout
 from blast_env.layout.placement import LayoutState, LegalLayout
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
 from blast_env.site.zone import BuildZone
-from blast_env.vehicles.access_way import closing_places
+
+_MOST_ROOMS: Final = 4
+_NOBODY: Final = 3
+"""Number of references to a kept room of observations that nobody has: the list, the name of it in
+the loop, and the argument of the count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +31,8 @@ class PlacementRules:
         catalogue: The catalogue.
         costs: Cost of each variant by its lower left cell (variants, rows, columns).
         dearest: The largest of these costs at a place that is legal on the empty site.
-        sizes: Rows and columns of each variant; 0 and 0 of a measure.
         passable: Cells that are free of structures (rows, columns).
-        variants: Rows, columns and item of each variant (variants, 3).
+        variants: Rows, columns and item of each variant, 0 and 0 of a measure (variants, 3).
     """
 
     scenario: Scenario
@@ -35,7 +40,6 @@ class PlacementRules:
     catalogue: Catalogue
     costs: FloatArray
     dearest: float
-    sizes: tuple[tuple[int, int], ...]
     passable: BoolArray
     variants: IntArray
     _elements: dict[int, Element] = field(default_factory=dict, init=False, repr=False)
@@ -51,14 +55,13 @@ class PlacementRules:
     def of(cls, start: LayoutState) -> "PlacementRules":
         """Return the rules on the site of a layout."""
         scenario, catalogue = start.scenario, start.catalogue
-        sizes = tuple((variant.rows, variant.columns) for variant in catalogue.variants)
         dearest = float(start.costs[start.fits].max(initial=0.0))
         variants = np.array(
             [(variant.rows, variant.columns, variant.item) for variant in catalogue.variants],
             dtype=np.int64,
         ).reshape(-1, 3)
         return cls(
-            *(scenario, scenario.zone, catalogue, start.costs, dearest, sizes, start.passable),
+            *(scenario, scenario.zone, catalogue, start.costs, dearest, start.passable),
             variants,
         )
 
@@ -102,6 +105,7 @@ class LayoutBatch:
         self.rules: list[PlacementRules] = [rules] * count
         self._numbers: IntArray = np.zeros((count, max(start.stock_left, 1)), dtype=np.int64)
         self._sites: IntArray = np.zeros(count, dtype=np.int64)  # the same number, the same rules
+        self._rooms: list[NDArray[np.float32]] = []
 
     def begin(self, indices: Sequence[int], rules: PlacementRules, start: LayoutState) -> None:
         """Put a layout in the place of others."""
@@ -172,16 +176,15 @@ class LayoutBatch:
 
     def _keep_open(self, indices: IntArray) -> None:
         """Take away places that would close the access way, in layouts of the same rules."""
+        from blast_env.vehicles.access_kernels import keep_open  # as in `place`
+
         rules = self.rules[indices[0]]
-        if rules.zone.access_way is None:
+        way = rules.zone.access_way
+        if way is None:
             return
-        for index in indices.tolist():
-            if isinstance(self.elements(index)[-1], Measure):
-                continue
-            passable = rules.passable & (self.occupancy[index] == 0)
-            closing = closing_places(rules.zone.access_way, passable, rules.sizes)
-            for own, closes in zip(self.legal[index], closing, strict=True):
-                own &= ~closes
+        sizes = np.ascontiguousarray(rules.variants[:, :2])
+        arrays = rules.passable, self.occupancy, sizes
+        keep_open(indices, *arrays, way.width_cells, way.is_upwards, self.legal)
 
     def elements(self, index: int) -> Layout:
         """Return the elements of a layout, in the order of placement."""
@@ -223,8 +226,20 @@ class LayoutBatch:
             self.rules if are_all else [self.rules[index] for index in chosen],
             lambda position: self.elements(chosen[position]),
             *(legal, self.occupancy[rows], self.left[rows], self.stock[rows]),
-            *(self.budget_left[rows], self.budget[rows]),
+            *(self.budget_left[rows], self.budget[rows], self._room),
         )
+
+    def _room(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return room for observations: that of earlier ones which nobody has any more, or new one.
+
+        The pages of new memory take longer than to write the observations.
+        """
+        for kept in self._rooms:
+            if kept.shape == shape and getrefcount(kept) == _NOBODY:
+                return kept
+        made = np.empty(shape, dtype=np.float32)
+        self._rooms = [*self._rooms[-_MOST_ROOMS + 1 :], made]
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +248,7 @@ class Placements:
 
     Attributes:
         layout: Returns the elements of one, by its position.
+        room: Returns an array of a shape for observations, with any content.
     """
 
     rules: Sequence[PlacementRules]
@@ -243,6 +259,7 @@ class Placements:
     stock: IntArray
     budget_left: FloatArray
     budget: FloatArray
+    room: Callable[[tuple[int, ...]], NDArray[np.float32]]
 
     @classmethod
     def of(cls, state: LayoutState) -> "Placements":
@@ -254,4 +271,5 @@ class Placements:
             *(state.legal[np.newaxis], state.occupancy[np.newaxis]),
             *(left, np.array([[zone.stock, *state.catalogue.stocks]])),
             *(np.array([state.budget_left or 0.0]), np.array([zone.budget or np.nan])),
+            lambda shape: np.empty(shape, dtype=np.float32),
         )

@@ -27,9 +27,9 @@ from blast_env.sections import PointM, Site
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.crash_rating import NOTHING, CrashPiece, Obstacles
 from blast_env.vehicles.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
-from blast_env.vehicles.reach import Reach, ReachQuery, steps_of
+from blast_env.vehicles.reach import Reach, ReachQuery, grown_steps, steps_of
 from blast_env.vehicles.vehicle import Entry, Vehicle
-from blast_env.vehicles.worst_places import WorstPlaces, least_distances_m, worst_of
+from blast_env.vehicles.worst_places import PlainGround, WorstPlaces, least_distances_m, worst_of
 
 _SAME_M: Final = 1e-9
 """Tolerance within which edges are equal, as in `Rectangle.contains`."""
@@ -96,6 +96,13 @@ class VehicleGround:
                 self.site.rectangle_m, tuple(part.rectangle_m for part in self.source.drivable)
             ),
         )
+
+    @cached_property
+    def plain(self) -> PlainGround | None:
+        """The same as arrays; `None` with a motion, oblique walls, or a gate that is penetrated."""
+        if self.source.motion is not None or _any_penetrated(self.rated_gates):
+            return None
+        return PlainGround.of(self.source, _query(self, NOTHING, self.rated_gates, ()), self.walls)
 
     def drive(self, obstacles: Obstacles = NOTHING) -> "Drive":
         """Return the drive of the vehicle against obstacles, cached."""
@@ -316,6 +323,15 @@ def _reach(
     held: Iterable[CrashPiece],
     broken: Iterable[CrashPiece],
 ) -> Reach:
+    return _query(ground, obstacles, held, broken).answer()
+
+
+def _query(
+    ground: VehicleGround,
+    obstacles: Obstacles,
+    held: Iterable[CrashPiece],
+    broken: Iterable[CrashPiece],
+) -> ReachQuery:
     source, site = ground.source, ground.site
     return ReachQuery(
         site,
@@ -328,7 +344,7 @@ def _reach(
         ),
         (*obstacles.solid, *(rated_piece.rectangle for rated_piece in broken)),
         ground.standing_m,
-    ).answer()
+    )
 
 
 _INWARDS: Final[Mapping[WallName, tuple[int, int]]] = MappingProxyType(
@@ -399,7 +415,20 @@ def _free_speeds(ground: VehicleGround) -> SpeedField:
 @lru_cache(maxsize=1024)
 def _worst_places(ground: VehicleGround, obstacles: Obstacles) -> WorstPlaces:
     """Return the worst places; the cache is larger than that of drives, which take more memory."""
+    if ground.plain is not None and not _any_penetrated(obstacles.rated):
+        half = ground.plain.query.half
+        rated_m = (piece.rectangle for piece in obstacles.rated)
+        found = ground.plain.worst(
+            grown_steps((*obstacles.stops, *rated_m), half), grown_steps(obstacles.solid, half)
+        )
+        if found is not None:
+            return found
     return ground.drive(obstacles).worst
+
+
+def _any_penetrated(pieces: Iterable[CrashPiece]) -> bool:
+    """Return whether a load may pass any of some pieces that stop the vehicle."""
+    return any(piece.rating.penetration_m != 0.0 for piece in pieces)
 
 
 @lru_cache(maxsize=64)

@@ -20,7 +20,7 @@ from blast_env.geometry import Rectangle
 from blast_env.sections import Site
 from blast_env.units import MODULE_SIDE_M
 
-_PER_M: Final = 1_000_000
+PER_M: Final = 1_000_000
 """Micrometres in a metre; whole numbers make equal lengths compare equal."""
 
 _MOST_STEPS: Final = 1000
@@ -34,7 +34,8 @@ Steps = NDArray[np.int64]
 def places_on(site: Site) -> int:
     """Return the number of places of a vehicle's charge on a site without obstacles."""
     along_x, along_y = (
-        steps_of(side_m) // _step(steps_of(side_m)) for side_m in (site.width_m, site.height_m)
+        steps_of(side_m) // places_apart(steps_of(side_m))
+        for side_m in (site.width_m, site.height_m)
     )
     return along_x * along_y
 
@@ -201,6 +202,25 @@ class ReachQuery:
     solid_m: tuple[Rectangle, ...]
     level_m: tuple[Rectangle, ...]
 
+    @property
+    def half(self) -> int:
+        """Half of the vehicle's width, micrometres."""
+        return steps_of(self.width_m) // 2
+
+    @cached_property
+    def ends(self) -> tuple[int, int]:
+        """Width and height of the site, micrometres."""
+        return steps_of(self.site.width_m), steps_of(self.site.height_m)
+
+    @cached_property
+    def boxes(self) -> tuple[Steps, Steps, Steps, Steps]:
+        """Closed and solid obstacles, entries, and level rectangles, micrometres (boxes, 4)."""
+        # Obstacles grow by half of the vehicle, which becomes a point (configuration space,
+        # Lozano-Perez 1983); entries shrink. In whole micrometres, touching is exact.
+        closed, solid = grown_steps(self.closed_m, self.half), grown_steps(self.solid_m, self.half)
+        # The places nearest to a structure touch it, or are level with its corners.
+        return closed, solid, grown_steps(self.entries_m, -self.half), grown_steps(self.level_m, 0)
+
     def answer(self) -> Reach:
         """Compute the reach of the vehicle."""
         from blast_env.vehicles.reach_kernels import (  # Numba takes long to import
@@ -208,47 +228,42 @@ class ReachQuery:
             reached_parts,
         )
 
-        # 1. Obstacles grow by half of the vehicle, which becomes a point (configuration space,
-        # Lozano-Perez 1983); entries shrink. In whole micrometres, touching is exact.
-        half = steps_of(self.width_m) // 2
-        closed, solid = _grown(self.closed_m, half), _grown(self.solid_m, half)
-        starts = _grown(self.entries_m, -half)
+        # 1. Obstacles and entries as boxes in whole micrometres.
+        closed, solid, starts, level = self.boxes
         boxes = np.concatenate((closed, solid, starts))
-        # The places nearest to a structure touch it, or are level with its corners.
-        level = _grown(self.level_m, 0)
         # 2. The edges of all boxes cut the plane into parts that are open or closed as a whole.
-        ends = steps_of(self.site.width_m), steps_of(self.site.height_m)
         (x, lattice_x), (y, lattice_y) = (
-            plane_of(boxes, level, half, end, _step(end), axis) for axis, end in enumerate(ends)
+            plane_of(boxes, level, self.half, end, places_apart(end), axis)
+            for axis, end in enumerate(self.ends)
         )
         # 3. The parts that are connected with an entry.
         start, reached, clear = reached_parts(x, y, closed, solid, starts)
         return Reach(
             width_m=self.width_m,
-            x_m=x / _PER_M,
-            y_m=y / _PER_M,
+            x_m=x / PER_M,
+            y_m=y / PER_M,
             start=start,
             reached=reached,
             clear=clear,
-            lattice_x_m=lattice_x / _PER_M,
-            lattice_y_m=lattice_y / _PER_M,
+            lattice_x_m=lattice_x / PER_M,
+            lattice_y_m=lattice_y / PER_M,
         )
 
 
 def steps_of(length_m: float) -> int:
     """Return a length in micrometres."""
-    return round(length_m * _PER_M)
+    return round(length_m * PER_M)
 
 
-def _grown(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
+def grown_steps(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
     """Return left, bottom, right and top of rectangles, grown on all sides (rectangles, 4)."""
     sides_m = np.array([*rectangles_m], dtype=np.float64).reshape(-1, 4)
-    steps = np.rint(sides_m * _PER_M).astype(np.int64)  # as `steps_of`
+    steps = np.rint(sides_m * PER_M).astype(np.int64)  # as `steps_of`
     grown: Steps = steps + np.array((-by, -by, by, by))
     return grown
 
 
-def _step(end: int) -> int:
+def places_apart(end: int) -> int:
     """Return the spacing of regular places of the charge on a side of the site, micrometres."""
     module = steps_of(MODULE_SIDE_M)
     return module * ceil(end / module / _MOST_STEPS)

@@ -13,6 +13,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Wall, WallLine, distances_between_m
 from blast_env.sections import PointM
+from blast_env.vehicles.reach import PER_M, ReachQuery, Steps, places_apart
 from blast_env.vehicles.vehicle import Vehicle
 
 _EQUAL_M: Final = 1e-6
@@ -59,11 +60,10 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
     from blast_env.vehicles.worst_kernels import chosen_places  # Numba takes long to import
 
     distances_m = _distances_m(walls, places_m)
-    middles_m = [(wall.bounds_m if isinstance(wall, WallLine) else wall).centre for wall in walls]
     chosen = chosen_places(
         np.ascontiguousarray(places_m),
         distances_m,
-        np.array(middles_m).reshape(-1, 2),
+        _middles_m(walls),
         source.places,
         source.least_apart_m,
         _EQUAL_M,
@@ -71,6 +71,68 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
     of_chosen_m = distances_m[:, chosen].min(axis=0, initial=np.inf)
     places = tuple((x_m, y_m) for x_m, y_m in places_m[chosen].tolist())
     return WorstPlaces(source, places, tuple(of_chosen_m.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class PlainGround:
+    """A vehicle's surroundings as arrays, for its worst places against many layouts in turn.
+
+    They are those of `worst_of` at all places of the reach, found without the reach.
+
+    Attributes:
+        source: The vehicle.
+        query: Its reach on the empty site.
+        walls_m: The loaded walls (walls, 4).
+        middles_m: Their middles (walls, 2).
+    """
+
+    source: Vehicle
+    query: ReachQuery
+    walls_m: FloatArray
+    middles_m: FloatArray
+
+    @classmethod
+    def of(cls, source: Vehicle, query: ReachQuery, walls: Sequence[Wall]) -> "PlainGround | None":
+        """Return the same of loaded walls, or `None` unless all are parallel to the site's sides.
+
+        Args:
+            source: The vehicle.
+            query: Its reach on the empty site.
+            walls: The loaded walls.
+        """
+        if not walls or any(isinstance(wall, WallLine) for wall in walls):
+            return None
+        return cls(source, query, np.array(walls, dtype=np.float64), _middles_m(walls))
+
+    def worst(self, closed: Steps, solid: Steps) -> WorstPlaces | None:
+        """Return the worst places against further obstacles; `None` if there are no places.
+
+        Args:
+            closed: Obstacles that stop it, grown, micrometres (boxes, 4).
+            solid: Obstacles that it drives over, grown, micrometres (boxes, 4).
+        """
+        from blast_env.vehicles.worst_kernels import worst_against  # Numba takes long to import
+
+        query = self.query
+        always, never, starts, level = query.boxes
+        places_m, distances_m = worst_against(
+            np.concatenate((always, closed)),
+            np.concatenate((never, solid)),
+            *(starts, level, query.half, query.ends),
+            (places_apart(query.ends[0]), places_apart(query.ends[1])),
+            *(PER_M, self.walls_m, self.middles_m),
+            *(self.source.places, self.source.least_apart_m, _EQUAL_M),
+        )
+        if not len(places_m):
+            return None
+        places = tuple((x_m, y_m) for x_m, y_m in places_m.tolist())
+        return WorstPlaces(self.source, places, tuple(distances_m.tolist()))
+
+
+def _middles_m(walls: Sequence[Wall]) -> FloatArray:
+    """Return the middle of each wall (walls, 2)."""
+    boxes_m = [wall.bounds_m if isinstance(wall, WallLine) else wall for wall in walls]
+    return np.array([box.centre for box in boxes_m]).reshape(-1, 2)
 
 
 def stand_off_m(walls: Iterable[Wall], position_m: PointM) -> float:

@@ -141,3 +141,16 @@ def test_random_numbers_are_those_of_single_environments() -> None:
     assert vectors[0].np_random_seed == (7, 4, 9)
     fresh = BlastBarrierVectorEnv(2, **chosen)
     assert len(set(fresh.np_random_seed)) == 2
+
+
+def test_observations_that_are_kept_do_not_change() -> None:
+    envs = BlastBarrierVectorEnv(
+        ENVS, scenario=small_scenario(), engine=ThinEngine(), observation="features", action="place"
+    )
+    observed, info = envs.reset(seed=0)
+    kept, copies = [observed[1:]], [observed[1:].copy()]  # a view keeps the whole
+    for _ in range(6):
+        observed, *_, info = envs.step(info["action_mask"].argmax(axis=1))
+        kept.append(observed)
+        copies.append(observed.copy())
+    assert same(kept, copies)

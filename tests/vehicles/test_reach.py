@@ -116,6 +116,26 @@ def test_lengths_need_be_no_multiple_of_half_a_metre(
     assert got == step_by_step(width, lambda *square: square in closed, side)
 
 
+@given(
+    boxes=st.lists(st.tuples(*[st.integers(0, 47)] * 2, *[st.integers(1, 9)] * 2), max_size=8),
+    solid=st.integers(0, 3),
+    width=st.integers(5, 11),
+)
+def test_the_worst_places_need_no_reach_and_are_the_same_to_the_last_bit(
+    boxes: list[tuple[int, int, int, int]], solid: int, width: int
+) -> None:
+    rectangles = tuple(
+        Rectangle.from_corner((0.1 * x, 0.1 * y), (0.1 * across, 0.1 * up))
+        for x, y, across, up in boxes
+    )
+    obstacles = Obstacles(stops=rectangles[solid:], solid=rectangles[:solid])
+    own = ground(0.1 * width)
+    walls = (Rectangle(4.0, 4.5, 5.0, 4.5), Rectangle(5.0, 1.3, 5.0, 4.5))
+    own = VehicleGround(own.source, own.site, (Rectangle(4.0, 1.3, 5.0, 4.5),), walls)
+    if len(own.drive(obstacles).places_m):
+        assert own.worst_places(obstacles) == own.drive(obstacles).worst
+
+
 def part(cuts_m: FloatArray, at_m: float) -> int:
     """Number of the cut at a value, or of the part between two cuts."""
     after = int(np.searchsorted(cuts_m, at_m - 1e-9))
