@@ -243,6 +243,7 @@ class ClusterBackend(ParallelBackendBase):
         key = id(section)
         sent = self._sent.get(key)
         if sent is None:
+            # A site is sent once for all of its blasts: what follows it has its place alone.
             packed = pickle.dumps(section)
             self.section_bytes.append(len(packed))
             content = self._client.submit(_unpacked, packed, _origin(), pure=False)
@@ -272,6 +273,7 @@ class ClusterBackend(ParallelBackendBase):
         """Fetch results, all that are ready at a time, until `stop_call` ends the queue."""
         is_over = False
         while not is_over:
+            # Waits for one, then takes all that are there: one message fetches many results.
             taken = [queue.get()]
             while not queue.empty():
                 taken.append(queue.get())
@@ -383,6 +385,7 @@ def _check(origin: str) -> None:
 @cache
 def _origin() -> str:
     """Return the code digests and versions on which the result of a piece of work depends."""
+    # Bits depend on this code, and on the libraries whose kernels add in another order.
     specs = (find_spec(name) for name in _OWN)
     folders = (Path(spec.origin).parent for spec in specs if spec is not None and spec.origin)
     known = versions(packages=_OTHERS)

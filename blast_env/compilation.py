@@ -52,6 +52,8 @@ class _SourcesCache(FunctionCache):
 @cache
 def _source_digest(function: FunctionType) -> str:
     """Return a digest of the sources of a function and of all that it uses of its package."""
+    # Files as a whole, since a name in a file may stand for anything else in it; constants by
+    # value, since they are in the machine code.
     digest, sources = sha256(), _Sources(function.__module__.partition(".")[0])
     sources.add(function)
     for path in sorted(sources.paths):
@@ -90,6 +92,7 @@ class _Sources:
             self._seen.add(id(value))
             self._add_file(value.__module__)
             if isinstance(value, FunctionType):
+                # Names come from the closure, from the globals, and from functions inside.
                 for used in value.__closure__ or ():
                     self.add(used.cell_contents, name)
                 self._add_names(value.__code__, value.__globals__)

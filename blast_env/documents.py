@@ -166,6 +166,7 @@ def parse_json(text: str) -> Any:
     """
     check_values(text)
     depth = 0
+    # Before the parser: it recurses, and fails without a place.
     for token in _JSON_TOKEN.finditer(text):
         depth = max(depth + (token[1] is not None) - (token[2] is not None), 0)
         if depth > MAX_DEPTH:
@@ -197,6 +198,7 @@ def check_values(text: str) -> str:
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    # Python would keep the last of equal keys in silence.
     content = dict(pairs)
     if len(content) < len(pairs):
         raise DocumentError("", "a key occurs twice")

@@ -124,6 +124,9 @@ class Rectangle(NamedTuple):
             x: x of their ends, of any shape.
             y: y of their ends, of the same shape.
         """
+        # Clipping by slabs (Liang & Barsky, ACM Trans. Graph. 3 (1984) 1): the shares of the
+        # segment at which it enters and leaves, the stricter ones of both axes. One that runs along
+        # an axis outside its slab never enters.
         enter, leave = np.zeros(x.shape), np.ones(x.shape)
         bounds = ((self.left, self.right, x), (self.bottom, self.top, y))
         for begin, (low, high, finish) in zip(start, bounds, strict=True):
@@ -211,6 +214,7 @@ class WallLine:
 
     def distances_m(self, points_m: FloatArray) -> FloatArray:
         """Return the distances of points (n, 2) from the wall (n,)."""
+        # The nearest point of a segment: the foot of the perpendicular, or the nearer end.
         at_m = np.clip(self.along_m(points_m), 0.0, self.length_m)[:, np.newaxis]
         away_m = points_m - np.array(self.start_m) - at_m * np.array(self.along)
         found: FloatArray = np.hypot(*away_m.T)
@@ -229,15 +233,18 @@ def stacked_runs(cells: BoolArray) -> IntArray:
         Lowest row, leftmost column, number of rows and number of columns of each rectangle
         (rectangles, 4), ordered by row and column.
     """
+    # 1. Runs of each row, between the steps up and down of a framed mask.
     framed = np.zeros((cells.shape[0], cells.shape[1] + 2), dtype=np.int8)
     framed[:, 1:-1] = cells
     steps = np.diff(framed, axis=1)
     row, first = np.nonzero(steps > 0)
     _, after = np.nonzero(steps < 0)
+    # 2. Sorted by their ends, so that equal runs of neighbouring rows follow each other.
     order = np.lexsort((row, after, first))
     row, first, after = row[order], first[order], after[order]
     goes_on = (np.diff(row) == 1) & (np.diff(first) == 0) & (np.diff(after) == 0)
     lowest = np.flatnonzero(np.concatenate((np.ones(len(row[:1]), dtype=bool), ~goes_on)))
+    # 3. One rectangle of each stack.
     heights = np.diff(np.append(lowest, len(row)))
     row, first, after = row[lowest], first[lowest], after[lowest]
     found: IntArray = np.column_stack((row, first, heights, after - first))

@@ -49,6 +49,7 @@ def _counted(section: BaseModel, dump: Any, left_out: Collection[HashMark]) -> d
     """Return the entries of a dump that count; sparse sections have no entry for some fields."""
     counted = {}
     for name, field in type(section).model_fields.items():
+        # A default that is left out keeps the hashes of scenarios older than the field.
         marks, value = _marks(field), getattr(section, name)
         is_default = value == field.get_default(call_default_factory=True)
         if name in dump and not (

@@ -63,6 +63,7 @@ def code_digest(folder: Path, left_out: Collection[str] = ()) -> str:
         folder: The folder; its subfolders count too.
         left_out: Names of files and folders directly in it that do not count.
     """
+    # Names and contents, so that a file that moves is another digest; sorted, as no folder is.
     digest = sha256()
     for path in sorted(folder.rglob("*.py")):
         name = path.relative_to(folder)

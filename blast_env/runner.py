@@ -11,7 +11,6 @@ from warnings import catch_warnings, simplefilter
 import joblib
 
 from blast_env.errors import BlastEnvError
-from blast_env.processes import end_with, uninterrupted
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -115,6 +114,8 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
 def _watched(function: Callable[[Any], Any], parent: int, host: str, item: Any) -> Any:
     """Do an item in a worker, which ends with the process that started it."""
     if os.getppid() == parent and socket.gethostname() == host:
+        from blast_env.processes import end_with  # as in `_parallel`
+
         end_with(parent)
     return function(item)
 
@@ -130,6 +131,8 @@ def _parallel(
     workers: int,
     return_as: Literal["generator", "generator_unordered"],
 ) -> Iterator[Any]:
+    from blast_env.processes import uninterrupted  # only where processes are started
+
     parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
     watched = partial(_watched, function, os.getpid(), socket.gethostname())
     try:

@@ -54,6 +54,7 @@ def p_value_of_mean(values: FloatArray) -> float:
     count, mean = len(values), float(values.mean())
     if count < 2 or mean == 0.0:
         return 1.0
+    # t = mean / (s / sqrt(n)) with n - 1 degrees of freedom, both tails.
     spread = float(values.std(ddof=1))
     if spread == 0.0:
         return 0.0

@@ -74,6 +74,7 @@ _MOST_PATH: Final = 4096
 
 def letters(number: int) -> str:
     """Return A to Z for 0 to 25, then AA, AB and so on."""
+    # Bijective base 26: there is no letter for 0, so that Z is followed by AA.
     before, last = divmod(number, 26)
     return (letters(before - 1) if before else "") + chr(ord("A") + last)
 

@@ -82,7 +82,7 @@ def card() -> dict[str, Any]:
         conforms_to=SPECIFICATION,
         data_limitations=(
             "No barrier of finite height was compared with a measurement. Peaks on cells of 0.5 m "
-            "are too low; docs/engineers/gas.md has the error of the cells."
+            "are too low; docs/engineers/gas.md has the grid error."
         ),
         distribution=files,
         record_sets=records,

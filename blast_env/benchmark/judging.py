@@ -64,6 +64,7 @@ class RunJudgement(Run):
 
         It forgets how much worse: `SubmissionJudgement.lead` ranks, which does not.
         """
+        # Where the best known layout is no better than the rule, equal to it is full marks.
         gain = self.rule - self.share
         if self.rule - self.best < _SAME:
             return 1.0 if gain > -_SAME else 0.0
@@ -148,6 +149,7 @@ class SubmissionJudgement:
         self, budget: int, value: Callable[[RunJudgement], float], missing: float
     ) -> list[list[float]]:
         """Return a value of the runs with a budget, by problem."""
+        # Every problem counts once, whatever the number of its runs, and also without any.
         found: dict[str, list[float]] = {name: [] for name in self.problems}
         for run in self.runs:
             if run.budget == budget:
@@ -227,12 +229,14 @@ def _judged(
     cell_m: float | None,
     processes: int,
 ) -> Iterator[RunJudgement]:
+    # 1. Shares of the references are stored for some cells, and hold for one version.
     cell = "" if cell_m is None else cell_key(cell_m)
     stored = {
         run.layout: run.shares[cell]
         for run in (reference.rule, reference.best)
         if cell in run.shares and engine_key(evaluator.engine) == reference.engine
     }
+    # 2. All others run, each layout once.
     wanted = (reference.rule.layout, reference.best.layout, *(run.layout for run in runs))
     layouts = [layout for layout in dict.fromkeys(wanted) if layout not in stored]
     found = shares_of(definition.case, layouts, evaluator, processes)

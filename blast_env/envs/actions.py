@@ -188,6 +188,8 @@ class ItemThenPlace(_Numbered):
         catalogue = scenario.zone.catalogue
         variant, row, column = np.indices((len(catalogue.variants), *catalogue.shape))
         rows, columns = catalogue.shape
+        # Without blocks the zone is one block, whose number is 0 everywhere: that choice has a
+        # single option, and goes.
         side = self.block_cells or max(rows, columns, 1)
         block = (row // side) * -(-columns // side) + column // side
         cell = (row % side) * min(side, columns) + column % side
@@ -232,6 +234,7 @@ class _Sight:
     def beside_m(self, scenario: Scenario) -> FloatArray:
         """Return the distance of each placement's centre from the line, along a row of cells."""
         variants = scenario.zone.catalogue.variants
+        # 1. The centre of a piece: half of its further cells beside its lower left one.
         half_m = (
             MODULE_SIDE_M
             / 2.0
@@ -240,6 +243,7 @@ class _Sight:
         centres_m = np.stack(scenario.zone.centres_m)
         from_start_m = centres_m[:, np.newaxis] + half_m.T[..., np.newaxis, np.newaxis]
         from_start_m = from_start_m - self.start_m[:, np.newaxis, np.newaxis, np.newaxis]
+        # 2. Its distance from the line, along the row of cells that lies across it.
         ahead, aside = (0, 1) if self.is_along_x else (1, 0)
         slope = self.along[aside] / self.along[ahead] if self.along[ahead] else 0.0
         beside_m: FloatArray = np.abs(from_start_m[aside] - slope * from_start_m[ahead])
@@ -399,19 +403,23 @@ class ActionNumbers:
         )
         if not 0 <= option < len(firsts) - 1:
             return None
+        # 1. The legal placements with this option.
         own = sorted_places[firsts[option] : firsts[option + 1]]
         places = own[chosen.possible.ravel()[own]]
         if not len(places):
             return None
+        # 2. Choices that they all share are made already.
         made = chosen.choices + 1
         while made < len(self.choices) and np.ptp(self.choices[made].flat[places]) == 0:
             made += 1
+        # 3. Of what no choice tells apart, the placement nearest to the line of sight.
         if made == len(self.choices):
             nearest = self._beside_m.flat[places].argmin() if len(places) > 1 else 0
             return int(places[nearest])
         possible = np.zeros_like(chosen.possible)
         possible.flat[places] = True
         possible.flags.writeable = False
+        # 4. Else the mask of what is left.
         options = tuple(int(choice.flat[places[0]]) for choice in self.choices[:made])
         return ActionChoice(possible, made, options)
 
@@ -433,15 +441,18 @@ class ActionNumbers:
         """
         options = self.choices[chosen.choices]
         wanted = options == action - self.first[chosen.choices]
+        # 1. The placements that the action meant, legal or not, after the choices so far.
         for choice, option in zip(self.choices, chosen.options, strict=False):
             wanted = wanted & (choice == option)
         numbers, rows, columns = wanted.nonzero()
         if not len(numbers):
             return None
+        # 2. Distances from their middle: along the line of sight before across it.
         up, right = np.indices(self.catalogue.shape)
         beside = np.abs(up - rows.mean()), np.abs(right - columns.mean())
         across, along = beside if self._is_sight_along_x else beside[::-1]
         distances = along * max(self.catalogue.shape) + across
+        # 3. The nearest legal one, turned as wanted, or else turned the other way.
         items = np.array([variant.item for variant in self.catalogue.variants])
         same_rotation = np.isin(np.arange(len(items)), numbers)
         for suits in (same_rotation, np.isin(items, items[numbers])):

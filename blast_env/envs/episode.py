@@ -305,6 +305,7 @@ def _outcome(
 ) -> Mapping[str, Any]:
     """Return the information on blasts."""
     has_blasts = unprotected is not _NOTHING
+    # Before the end zeros of the same keys and types, as vector environments need.
     counts = evaluator.counts if has_blasts else BlastCounts()
     found: dict[str, Any] = {
         "impulse_psi_s": protected.impulse_psi_s,
@@ -395,6 +396,7 @@ class Episodes:
             ScenarioError: If the charge of the options is not clear of a structure or the border.
             BlastEnvError: If the scenario has another size than the representative one.
         """
+        # Episodes on a site that begin empty are begun together.
         is_empty = isinstance(options.layout, Sequence) and not options.layout
         begins_as_site = is_empty and not options.fix_charge  # another type is refused by name
         on_sites: dict[int, tuple[_Site, list[int]]] = {}
@@ -428,6 +430,8 @@ class Episodes:
     ) -> tuple[_Site, tuple[AnyCharge, ...], NDArray[np.int64]]:
         """Draw site, charges and seeds of blasts (charges, realisations) of an episode."""
         task = self.task
+        # Site, charges, seeds: always in this order, and as many numbers, whatever is fixed
+        # afterwards.
         scenario = task.source.sample(rng)
         site = self.site_of(scenario)
         drawn = task.threat_model.draw(scenario, rng)
@@ -447,12 +451,16 @@ class Episodes:
         """
         chosen, layouts = np.array(indices), self.layouts
         wanted = np.array(actions)
+        # 1. What the actions do; the masks are those before them.
         found = self._all_made(chosen, wanted)
         self._before[chosen] = layouts.placed[chosen]
         self._begins[chosen] = ~self._has_begun[chosen]
         self._has_begun[chosen] = True
         places = found >= 0
+        # 2. Elements are placed, in all layouts at once.
         layouts.place(chosen[places], found[places])
+        # 3. Illegal actions change nothing. Repeated, or too many, they end the episode: a policy
+        # that is deterministic would repeat one for ever.
         stops, illegal = found == _FINISHES, found == _ILLEGAL
         for position in np.flatnonzero(illegal).tolist():
             index = indices[position]
@@ -460,6 +468,7 @@ class Episodes:
             episode.without_effect += 1
             repeats = self.task.illegal.moves and wanted[position] == self._repeated[index]
             stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
+        # 4. Who has finished or filled the zone, and the final layouts.
         self._repeated[chosen] = np.where(illegal, wanted, _NO_ACTION)
         self.ended[chosen] = stops | layouts.is_full[chosen]
         self._ended_now = chosen[self.ended[chosen]].tolist()
@@ -559,9 +568,11 @@ class Episodes:
         """
         chosen = np.asarray(indices)
         self.terms[chosen] = 0.0
+        # A reward at the ends pays at the first and the last action alone.
         paid = chosen if self._of_turns else chosen[self._begins[chosen] | self.ended[chosen]]
         if len(paid):
             self.terms[paid, :-1] = self._paid(paid)
+        # The cost of illegal actions is a term of its own.
         without_effect = chosen[self._repeated[chosen] != _NO_ACTION]
         if len(without_effect):
             self.terms[without_effect, -1] = -self.task.illegal.cost
@@ -600,6 +611,7 @@ class Episodes:
             own: list[Any] = [self._observed(index) for index in indices]
             empty: Any = create_empty_array(space, len(own))
             return concatenate(space, own, empty)
+        # A choice made so far leaves fewer cells, and only these are shown as free.
         possible = {}
         if not episodes[0].shown.actions.are_plain:
             pairs = zip(indices, episodes, strict=True)
@@ -635,6 +647,8 @@ class Episodes:
             for position, index in enumerate(indices):
                 of_episode = self.running[index].shown.actions
                 masks[position] = of_episode.mask(self._choice(index))
+        # An episode that has ended waits for `reset`: one legal action, or masked sampling would
+        # fail.
         over = self.ended[list(indices)]
         masks[over, :-1], masks[over, -1] = 0, 1
         return self.code.masks(masks)

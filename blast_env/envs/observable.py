@@ -21,6 +21,7 @@ from blast_env.site import (
     Scenario,
     VehicleSource,
 )
+from blast_env.site.zone import module_costs_of
 from blast_env.vehicles.reach import squares_of
 
 Array = NDArray[Any]
@@ -171,14 +172,15 @@ def stock_shares(placements: Placements) -> FloatArray:
     left, shares = placements.left[:, 0], np.empty((len(placements.left), 3))
     shares[:, 0] = left / placements.stock[:, 0]
     shares[:, 1] = np.minimum(left / FULL_STOCK, 1.0)
+    # NaN marks a zone without a budget, which never runs out.
     has_none = np.isnan(placements.budget)
     shares[:, 2] = np.where(has_none, 1.0, placements.budget_left / placements.budget)
     return shares
 
 
-def cost_shares(scenario: Scenario) -> FloatArray:
+def cost_shares(zone: BuildZone) -> FloatArray:
     """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
-    costs = LayoutState.empty(scenario).module_costs
+    costs = module_costs_of(zone)
     return np.asarray(costs / costs.max())
 
 

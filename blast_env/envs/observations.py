@@ -135,7 +135,7 @@ class FeaturesObservation:
         charge = _charge_and_corner(scenario, observable.sources)
         site = (charge, structures[:, :-1].ravel())
         items = (structures[:, -1], *item_values(zone)) if zone.items else ()
-        constants = np.concatenate((*site, cost_shares(scenario).ravel(), *items))
+        constants = np.concatenate((*site, cost_shares(zone).ravel(), *items))
         return FeaturesEpisode(
             np.clip(constants, 0.0, 1.0).astype(np.float32),
             variant_values(zone),

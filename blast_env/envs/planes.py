@@ -93,6 +93,7 @@ class SiteGrid:
 
     def _line(self, start_m: PointM, end_m: PointM) -> Plane:
         """Return a plane of closely spaced points along a line."""
+        # As many points per module along a line that its plane is even.
         start, end = np.array(start_m), np.array(end_m)
         length_m = float(np.hypot(*(end - start)))
         count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
@@ -102,6 +103,9 @@ class SiteGrid:
     def _points(self, points_m: NDArray[np.float64]) -> Plane:
         """Return a plane of points (n, 2), each distributed over the four squares around it."""
         plane = np.zeros((self.rows, self.columns), dtype=np.float32)
+        # Cloud in cell: the shares of a point in the four squares around it are linear in its
+        # offset from their centres, so that their mean is the point (Hockney & Eastwood, Computer
+        # Simulation Using Particles, 1988).
         places = points_m[:, ::-1] / MODULE_SIDE_M - 0.5
         low = np.floor(places).astype(int)
         beyond = places - low
@@ -285,7 +289,7 @@ class GridObservation:
         vehicles = VehicleView.of(scenario, observable.sources)
         episode = GridEpisode(static, lattice, channels, vehicles)
         protected, others, heights = _structure_planes(grid, scenario)
-        costs = lattice.plane(cost_shares(scenario))
+        costs = lattice.plane(cost_shares(zone))
         charge = _charge_plane(grid, observable.sources)
         names = ("protected", "other_structures", "cost", "charge")
         episode.show(static, names, np.stack((protected, others, costs, charge)))
@@ -334,6 +338,7 @@ class GridEpisode(BatchObservation):
             placements: The modules placed so far in each.
             planes: All planes (episodes, channels, rows, columns), changed in place.
         """
+        # 1. Values that are the same everywhere, and values of cells.
         channels = episodes[0].channels
         uniform, on_cells = stock_shares(placements), cells_shown(placements)
         names, cell_names = ["stock_share", "stock", "budget_share"], ["barrier", "free"]
@@ -343,6 +348,7 @@ class GridEpisode(BatchObservation):
             on_cells = np.concatenate((on_cells, items_placed(placements)), axis=1)
             cell_names += [BARRIER_HEIGHT, "stops_vehicles", *episodes[0].ending(":legal")]
         planes[:, [channels.index(name) for name in names]] = _levels(uniform)[..., None, None]
+        # 2. Cells go to the squares of the site: straight where they fill one each, else by area.
         numbers = [channels.index(cell_name) for cell_name in cell_names]
         levels = _levels(on_cells)
         for position, (own, of_cells, whole, episode) in enumerate(
@@ -399,6 +405,8 @@ def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane,
 
 
 def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
+    # Probability and mass of the charge: their product would hide which of both is small, so that a
+    # square has the mean mass, weighed by the root of its probability.
     total_weight = sum(source.weight for source in sources)
     likely = np.zeros((grid.rows, grid.columns), dtype=np.float32)
     heavy = np.zeros_like(likely)

@@ -98,6 +98,8 @@ class Campaign:
             LayoutError: If a layout does not fit the build zone.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
+        # Coarser cells cost an eighth of the cells and half of the steps: their share of the
+        # progress.
         whole = 100 if self.coarser is None else 100 - _COARSER
         (found,) = blasts_of([self], share_of(progress, 0, 100, whole), drawing)
         return self.with_coarse(found, worst(found), share_of(progress, whole, 100, 100 - whole))
@@ -117,6 +119,7 @@ class Campaign:
 
         Nothing is run.
         """
+        # A threat counts if all layouts are known under it: comparisons are of pairs.
         known: dict[str, list[BlastRecord]] = {name: [] for name in self.layouts}
         threats = []
         for threat in self.case.threats:

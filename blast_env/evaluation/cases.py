@@ -94,6 +94,7 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[LoadCase,
         if seed in plain[:index]:
             raise BlastEnvError(f"seeds[{index}] is {seed}, appears twice, must be unique")
     found = find_scenario(scenario)
+    # A vehicle drawn twice stands at two different places, the worst first.
     charges = ranked(draw_threat(found, seed) for seed in plain)
     return tuple(LoadCase(charge, seed) for charge, seed in zip(charges, plain, strict=True))
 
@@ -247,6 +248,8 @@ class LoadCaseSet:
         Args:
             loads: One per threat, in their order; all, or only the first ones, at least one.
         """
+        # 1. A single load is its own mean and its own worst; 2. the mean over the realisations of
+        # each charge; 3. the risk measure over the charges.
         risk = self._risk
         if len(loads) == 1 and isinstance(risk, MeanRisk | WorstRisk):
             return float(loads[0])
@@ -302,6 +305,7 @@ def one_of_each_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
 
     Ranks of a vehicle beyond the number of its places repeat the same places.
     """
+    # A rank beyond the last place begins again at the first.
     first: dict[AnyCharge, LoadCase] = {}
     for threat in threats:
         charge = threat.charge

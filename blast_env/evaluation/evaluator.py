@@ -410,6 +410,7 @@ class Assessment:
     @classmethod
     def of(cls, case: LoadCaseSet, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
         """Return the assessment of a layout from its loads, one per threat of the case."""
+        # Impulse, peak and objective, each combined over the threats by itself.
         combined, counts = case.combined, case.scenario.objective
         sums = [s for load in loads if (s := load.protected_impulse_sim) is not None]
         return cls(
@@ -488,6 +489,7 @@ class DesignProblem:
     @property
     def known_charge(self) -> AnyCharge | None:
         """The charge if it is known, that is, the same in all threats; otherwise `None`."""
+        # Realisations of one charge are one charge.
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else None
 
@@ -502,6 +504,7 @@ class DesignProblem:
         Raises:
             BudgetError: If the total would exceed the budget; none is counted then.
         """
+        # The order of a layout and its measures change no load: such pairs are one blast.
         asked = {(tuple(sorted(load_relevant(layout))), threat) for layout, threat in pairs}
         asked |= self._asked
         if self.budget is not None and len(asked) > self.budget:

@@ -118,6 +118,7 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
         parts.setdefault(load.building, []).append(load)
     found = []
     for name, own in parts.items():
+        # A building of one part is that part under its own name.
         if len(own) > 1:
             found.append(_on_building(name, own))
         else:
@@ -126,6 +127,7 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
 
 
 def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
+    # Impulses are means over the area, peaks the largest, and notes those of the worst part.
     counted = counted_parts(parts)
     areas_m2 = [part.area_m2 for part in counted if part.area_m2 is not None]
     weights = [part.weight for part in counted]
@@ -291,6 +293,7 @@ def structure_response(
     `bays` has their damage with each of their possible components, `named` the components of all
     bays.
     """
+    # The damage of all possible components is known: those that stand in the bays count.
     chosen = {item.bay.name: item for item in named}
     is_glazing = objective.measure == "glazing"
     damage, area_m2 = [], []
@@ -348,6 +351,8 @@ def parts_digest(scenario: Scenario) -> str:
     panes and walls in the bays are no part of it, nor are measures that replace them: their
     response is computed from the histories.
     """
+    # Masses decide which pieces fall in a blast; names and divisions of facades decide what is
+    # recorded.
     zone = scenario.build_zone
     items = [] if zone is None else [item.model_dump(mode="json") for item in zone.items]
     structures = [
@@ -499,6 +504,7 @@ class BlastRecord:
 
     def encoded(self) -> bytes:
         """Return the record as bytes: a line of JSON, then the arrays."""
+        # A line of JSON with all that has a name, then the arrays, which JSON would triple.
         pieces = None if self.pieces is None else self.pieces.to_dict("split", index=False)
         header = _Header(
             structures=self.loads.structures,

@@ -67,6 +67,7 @@ class BlastStore:
         Loads in the file that cannot be those of `scenario` count as missing: anybody may write to
         it.
         """
+        # 1. In memory; 2. in the file; 3. what was found there stays in memory.
         loads = self._loads.get(key)
         if loads is not None:
             with suppress(KeyError):  # another thread has displaced it
@@ -126,6 +127,7 @@ class BlastStore:
         except BlastEnvError as error:
             warnings.warn(f"a blast counts as missing: {error}", BlastEnvWarning, stacklevel=3)
             return None
+        # A file can hold anything: loads must have the structures and modules of the site.
         is_known = found is not None and (
             scenario is None or found.loads.are_for(find_scenario(scenario))
         )

@@ -290,6 +290,7 @@ class StudyCost(NamedTuple):
         costs_s = {name: sum(cost.seconds for cost in own) for name, own in self.parts.items()}
         if label not in costs_s:
             return None
+        # Progress by cost: cells of half the side are eight times as many, in twice the steps.
         names = list(costs_s)
         before_s = sum(costs_s[name] for name in names[: names.index(label)])
         return min((before_s + share * costs_s[label]) / sum(costs_s.values()), 1.0)

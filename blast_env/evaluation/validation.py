@@ -12,14 +12,6 @@ from collections.abc import Iterable
 from enum import IntEnum
 from typing import Final, NamedTuple
 
-from blast_env.tables import Column
-
-VALIDATION_COLUMNS: Final = (
-    Column("validation", "", "status of the load: measured, verified, approximate or outside"),
-    Column("reason", "", "reason for the status"),
-)
-"""The validation status of the load of a row."""
-
 NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
 """Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 

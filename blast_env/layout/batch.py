@@ -156,6 +156,7 @@ class LayoutBatch:
         self.placed[indices] += 1
         arrays = self.legal, self.occupancy, self.table, self.left
         place(indices, numbers, self.rules[indices[0]].variants, *arrays)
+        # Budgets and access ways are those of a site: layouts on one site at once.
         sites = self._sites[indices]
         for site in dict.fromkeys(sites.tolist()):
             own = indices[sites == site]
@@ -199,6 +200,7 @@ class LayoutBatch:
 
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""
+        # What `LayoutState` would find from the elements is here already.
         state = LayoutState(self.rules[index].scenario, self.elements(index))
         legal, occupancy = self.legal[index].copy(), self.occupancy[index].copy()
         legal.flags.writeable = False

@@ -24,10 +24,13 @@ def place(
         variant, cell = number // (rows * columns), number % (rows * columns)
         row, column = cell // columns, cell % columns
         high, wide, item = variants[variant]
+        # 1. The element itself: its cells, and its piece less in stock.
         table[index, variant, row, column] = 1
         occupancy[index, row : row + high, column : column + wide] = variant + 1
         left[index, 0] -= 1
         left[index, 1 + item] -= 1
+        # 2. What it takes away from every variant: all places of one that is used up, else those
+        # from which a piece would reach into its cells.
         for other in range(count):
             if left[index, 0] == 0 or (
                 left[index, 1 + item] == 0 and variants[other, 2] == item
@@ -122,6 +125,7 @@ def limit_to_budget(
     """
     flat = costs.reshape(-1)
     for index, spent in zip(indices, _exact_costs(indices, numbers, placed, costs)):  # noqa: B905
+        # What is spent only grows. Until it reaches what the dearest place leaves, nothing changes.
         budget_left[index] = max(0.0, budget - spent)
         spendable = most - spent
         if spendable < dearest:

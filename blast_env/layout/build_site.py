@@ -199,6 +199,8 @@ def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
         BlastEnvError: If there is no build zone.
         LayoutError: If the catalogue has no such item, or it cannot be turned.
     """
+    # A barrier is one structure of modules; each stands on the ground below it, which may be a
+    # terrace.
     zone, modules = scenario.zone, scenario.zone.modules(layout)
     terraces = [structure for structure in scenario.structures if structure.carries]
     bases_m = [ground_below_m(terraces, zone.cell_rectangle_m(module.cell)) for module in modules]

@@ -165,6 +165,7 @@ class LayoutState:
         Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
         (1, 0, 0) without a build zone.
         """
+        # 1. Free and usable ground; 2. the budget; 3. the stock; 4. the access way.
         cells, item_of = self._empty_zone, [variant.item for variant in self.catalogue.variants]
         legal = cells.places(cells.usable & (self.occupancy == 0))
         if self._zone.budget is not None:
@@ -206,6 +207,7 @@ class LayoutState:
         """Whether some legal piece could cover each cell (rows, columns), read-only."""
         if not self.catalogue.has_items:
             return self.free
+        # Each variant covers the cells up and to the right of its lower left one.
         ground = np.zeros(self._zone.shape, dtype=bool)
         rows, columns = ground.shape
         for legal, variant in zip(self.legal, self.catalogue.variants, strict=True):
@@ -372,6 +374,7 @@ class LayoutState:
             return False
         if any(isinstance(element, Measure) and element[:2] != (0, 0) for element in self.layout):
             return False
+        # From cheap to costly checks; the last one searches a way across the site.
         if min(self.stock_left, *self.stocks_left) < 0 or len(set(self.cells)) < len(self.cells):
             return False
         if not all(map(zone.has, self.cells)):
@@ -526,6 +529,7 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
     Raises:
         LayoutError: As `LayoutState.of`, if an element cannot be placed.
     """
+    # Checked before against this very scenario: a blast is asked for several times.
     if isinstance(layout, LegalLayout) and layout.scenario is scenario:
         return layout
     if isinstance(layout, tuple) and not layout:
@@ -548,6 +552,7 @@ def obstacles_of(
     stops: list[Rectangle] = []
     solid: list[Rectangle] = []
     rated: list[CrashPiece] = []
+    # In the order of their places, so that equal layouts have equal obstacles, and one search.
     for element in sorted(standing(layout)):
         variant, (row, column) = zone.catalogue.variant(element), element[:2]
         rectangle = zone.cells_rectangle_m(row, column, variant.rows, variant.columns)

@@ -106,6 +106,7 @@ def _draw(
     loads = [_loads(facade, own) for (_, facade), own in zip(rows, members, strict=True)]
     every = np.concatenate(loads)
     most = every.max(axis=0)
+    # The picture holds all points, and a factor beyond them, but at most so many decades.
     low, high = np.maximum(every.min(axis=0), most / _DECADES) / _REACH, most * _REACH
     peak_kpa = np.geomspace(low[0], high[0], _PEAKS)
     bounds = level_bounds(component, PA_PER_KPA * peak_kpa, (low[1], high[1]))
@@ -123,6 +124,7 @@ def _draw(
         places = [
             dict(zip(own, points, strict=True)) for own, points in zip(members, loads, strict=True)
         ]
+        # The same bay with and without the layout, joined.
         for index in places[0].keys() & places[1].keys():
             ends = np.array([place[index] for place in places])
             axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
@@ -161,6 +163,7 @@ def level_bounds(
     part = panel_of(chosen, storey_m) if isinstance(chosen, Wall) else pane_of(chosen)
     for level in sorted(LevelOfProtection, reverse=True)[:-1]:
         low, high = (np.full(len(peak_pa), impulse_pa_s) for impulse_pa_s in impulses_pa_s)
+        # Bisection of the logarithm of the impulse, at all peaks at once: damage grows with it.
         for _ in range(_HALVINGS):
             middle = np.sqrt(low * high)
             allows = np.array(

@@ -155,6 +155,7 @@ def catalogue() -> dict[str, Glazing | Wall]:
     Raises:
         BlastEnvError: If the file is invalid.
     """
+    # Read once, and checked as the components of a scenario are.
     text = files("blast_env.response").joinpath("data", "components.toml").read_text("utf-8")
     try:
         return _READ.validate_python(tomllib.loads(text))

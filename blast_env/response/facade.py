@@ -261,6 +261,7 @@ def peak_corrected(
     Returns:
         Times (finer than before), and histories (bays, times).
     """
+    # Pressures times f and times over f: each impulse stays, to the rounding of new times.
     factors = np.full(len(pressure_pa), factor)
     return rescaled(time_s, pressure_pa, factors, 1.0 / factors)
 

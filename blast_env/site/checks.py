@@ -34,6 +34,7 @@ def check_sections(scenario: Content) -> tuple[Problem, ...]:
 
     Whatever takes memory or time is counted first; too much of it is the only problem then.
     """
+    # What would take memory or minutes is refused before it is made.
     counted = tuple(_count_problems(scenario))
     return counted or (
         *_name_problems(scenario),
@@ -80,6 +81,7 @@ def _removable_problems(scenario: Content) -> Iterator[Problem]:
     if scenario.build_zone is None:
         return
     structures = {structure.name: structure for structure in scenario.structures}
+    # A structure can be taken away once: the first measure that names it has it.
     first_use: dict[str, str] = {}
     for number, removable in enumerate(scenario.build_zone.removable):
         for place, name in enumerate(removable.structures):
@@ -163,6 +165,7 @@ def _structure_problems(scenario: Content) -> Iterator[Problem]:
         yield from outside_site(
             scenario, f"structures[{index}]", described, Rectangle.around(plans_m)
         )
+    # Structures may stand above each other, but not in each other.
     for (i, one), (j, other) in combinations(enumerate(scenario.structures), 2):
         if _overlap(one, other) and not _are_above_each_other(one, other):
             message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"

@@ -74,6 +74,7 @@ class BayComponents:
         )
         assert window is None or isinstance(window, Glazing)
         assert wall is None or isinstance(wall, Wall)
+        # 1. The window of the facade, with panes as large as stated; 2. other glass in it.
         stated = zip(("width_m", "height_m"), self.pane_m, strict=True)
         sides_m = {side: value for side, value in stated if value is not None}
         if window is not None and sides_m:
@@ -85,6 +86,7 @@ class BayComponents:
 
     def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
         """Return its components, and those that measures would put there."""
+        # Measures one by one: each component that one of them would put here.
         reached = [self.hardened([measure]) for measure in measures]
         glasses = dict.fromkeys(bay.glazing for bay in (self, *reached) if bay.glazing)
         walls = dict.fromkeys(bay.wall for bay in (self, *reached) if bay.wall)

@@ -192,6 +192,7 @@ class ObjectiveSection(Section):
             damage: Damage of the bays (bays,).
             area_m2: Area of each (bays,).
         """
+        # Beyond the limit a step of 1, so that one bay more below the level outweighs any excess.
         total_m2 = float(area_m2.sum())
         if self.level is not None:
             limit = fails_from(self.level)
@@ -210,6 +211,8 @@ class ObjectiveSection(Section):
         """
         if self.target is None:
             return combined
+        # Costs are shares of the budget and at most 1: any layout that reaches the target is better
+        # than all that miss it.
         return 1.0 + combined if combined > 0.0 else cost_share
 
     def load(

@@ -97,6 +97,8 @@ def _entry_problems(scenario: Content, key: str, source: VehicleSource) -> Itera
 def _way_problems(scenario: Content, key: str, ground: VehicleGround) -> Iterator[Problem]:
     """Check that a vehicle can enter, approach a protected structure, and be stopped."""
     width = f"{ground.source.width_m:g} m, its width"
+    # (1) It can enter; (2) it comes nearer than where it enters, else barriers change nothing; (3)
+    # some barrier can hold it farther off.
     reach = ground.reach()
     if not reach.enters:
         message = (
@@ -144,6 +146,7 @@ def _stopping_problems(
 
 def _stopping_cells(empty: EmptyZone, source: Vehicle) -> BoolArray:
     """Return the cells that an item which stops the vehicle can cover (rows, columns)."""
+    # All cells that some item in stock which stops it can cover, wherever that item stands.
     cells = np.zeros_like(empty.usable)
     rows, columns = cells.shape
     for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):

@@ -377,6 +377,7 @@ class EmptyZone:
 def empty_zone(surroundings: Surroundings) -> EmptyZone:
     """Return the cells of a build zone without modules, cached."""
     zone = surroundings.zone
+    # 1. What a cell is good for: building, driving, and on which height it lies.
     boxes, usable = zone.boxes, usable_cells(surroundings)
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
@@ -385,7 +386,8 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     ground = ground_m(surroundings.structures, boxes)
     heights_m = np.unique(ground)
     levels = ground == heights_m[len(heights_m) == 1 :, np.newaxis, np.newaxis]
-    module_costs = _module_costs(zone, boxes)
+    # 2. What a piece costs by its lower left cell.
+    module_costs = module_costs_of(zone)
     catalogue = zone.catalogue
     costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
     # Where pieces fit follows from the zone itself: first without, then with the answer.
@@ -408,6 +410,7 @@ def usable_cells(surroundings: Surroundings) -> BoolArray:
 
 def reasons_against(surroundings: Surroundings, cells: BoolArray) -> dict[str, int]:
     """Return the first reason against the use of each cell of a mask, with the number of cells."""
+    # Each cell counts for the first reason only: the numbers add up to the cells.
     left, found = cells.copy(), {}
     for reason, blocked in _blocked(surroundings, surroundings.zone.boxes):
         if count := int((left & blocked).sum()):
@@ -489,12 +492,13 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
         )
 
 
-def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
+def module_costs_of(zone: BuildZone) -> NDArray[np.float64]:
     """Return the cost of a module on each cell: the highest of the areas that overlap it.
 
     With a catalogue it is the factor of an item's cost, 1 outside all areas.
     """
-    highest = np.zeros(zone.shape)
+    # Where areas overlap, the dearest one counts.
+    highest, boxes = np.zeros(zone.shape), zone.boxes
     for area in zone.cost_areas:
         inside = overlapping(area.rectangle_m, boxes)
         cost = area.cost_factor if zone.items else area.module_cost
@@ -511,6 +515,8 @@ def _costs(
     """
     if not zone.items:
         return module_costs
+    # A place from which a piece would leave the zone has no cost; a measure is bought at the first
+    # cell.
     costs = np.full(zone.shape, inf)
     if variant.is_measure:
         costs[0, 0] = variant.cost

@@ -322,6 +322,7 @@ class ItemSitePlan(NamedTuple):
 
 
 def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
+    # 1. Where the road or the entry is, and how far the facades are.
     middle_m = ranges.side_m / 2.0 + draws.length_m(ranges.shift_m)
     front_m = _ROAD_M + draws.length_m(ranges.stand_off_m)
     rows = 2 if draws.happens(ranges.second_probability) else 1
@@ -330,6 +331,7 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
     facades_m = [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
     facades_m += [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
     facades_m = facades_m[:rows]
+    # 2. The buildings one above the other, inside the margins.
     together_m = sum(facades_m) + (rows - 1) * _BETWEEN_M
     bottom = on_grid(ranges.side_m / 2.0 + draws.length_m(ranges.shift_m) - together_m / 2.0)
     bottom = min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - together_m)
@@ -341,6 +343,7 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
         corner_m = (front_m + back_m, bottom)
         buildings.append(Rectangle.from_corner(corner_m, (depth_m, facade_m)))
         bottom += facade_m + _BETWEEN_M
+    # 3. The zone between road and buildings, midway between their middles.
     left = draws.length_m(ranges.zone_from_border_m)
     middles = (middle_m + sum(building.centre[1] for building in buildings) / len(buildings)) / 2.0
     low = on_grid(middles - ranges.zone_side_m / 2.0)
@@ -363,6 +366,7 @@ def _place(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str
 
 def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str, Any]:
     """Return a vehicle that enters on the left and drives up to the kerb before the buildings."""
+    # The forecourt lies abreast of the zone, so that its pieces can bar all of it.
     width_m = draws.length_m(ranges.vehicle_width_m)
     court_m = draws.length_m(ranges.forecourt_m)
     entry_m = min(draws.length_m(ranges.entry_m), court_m)
@@ -430,6 +434,7 @@ def _zone(
 
 def _items(draws: Draws, ranges: ItemSiteRanges, has_vehicle: bool) -> list[dict[str, Any]]:
     """Return the catalogue: the same items for all sites, some of them not in stock."""
+    # One power of the height for all items of a site: what height costs differs by site.
     power = draws.amount(ranges.price_of_height, 1)
     always = draws.count((1, 2))  # one of the two kinds of T-walls
     items = []

@@ -196,6 +196,7 @@ def _draw_threat(draws: Draws, ranges: SiteRanges) -> Rectangle:
 
 
 def _draw_building(draws: Draws, ranges: SiteRanges, threat: Rectangle) -> Rectangle:
+    # A stand-off leaves room for the least depth, and the depth what the stand-off left.
     room_m = ranges.side_m - MARGIN_M - threat.right
     stand_off_m = draws.length_m(_at_most(ranges.stand_off_m, room_m - ranges.depth_m[0]))
     depth_m = draws.length_m(_at_most(ranges.depth_m, room_m - stand_off_m))
@@ -209,6 +210,7 @@ def _draw_zone(
 ) -> Rectangle:
     side_m = ranges.zone_side_m
     left = threat.right + draws.length_m(ranges.zone_from_threat_m)
+    # The zone is midway between threat and facade, where a wall crosses the line of sight.
     middle = (threat.centre[1] + building.centre[1]) / 2.0
     bottom = on_grid(middle - side_m / 2.0) + draws.length_m(ranges.zone_shift_m)
     bottom = min(max(bottom, 0.0), ranges.side_m - side_m)
@@ -271,6 +273,7 @@ def _draw_keep_outs(draws: Draws, ranges: SiteRanges, plan: _Plan) -> list[dict[
     squares = [("hydrant", HYDRANT_SIDE_M)] if draws.happens(ranges.hydrant_probability) else []
     trees = draws.count(ranges.trees)
     squares += [("tree", draws.length_m(ranges.tree_side_m)) for _ in range(trees)]
+    # One after the other, each clear of those before; one without room is left out.
     for reason, side_m in squares:
         others = [ObstacleSpace(place, 0.0) for _, place in places]
         place = draw_place(draws, yard(plan.zone, plan.building), (side_m, side_m), others)

@@ -52,12 +52,15 @@ class _Served:
 
     def loads(self, guess: Guess) -> list[BlastLoads]:
         """Return the loads of each layout of a prediction."""
+        # 1. Predictions of protected structures at their places, 0 for the others.
         on_structures = np.zeros((len(guess.impulse_pa_s), len(self._zero_loads)))
         on_structures[:, self._places] = guess.impulse_pa_s
+        # 2. All modules of a structure have its mean.
         on_modules = on_structures[:, self._of_modules]
         impulses_pa_s = guess.impulse_pa_s.tolist()
         nothing = [[None] * len(self._places)] * len(impulses_pa_s)
         peaks_pa = nothing if guess.peak_pa is None else guess.peak_pa.tolist()
+        # 3. Loads by structure; with the response of bays, where the objective asks for it.
         responds, found = self.site.scenario.objective.is_response, []
         for index, predicted in enumerate(zip(impulses_pa_s, peaks_pa, strict=True)):
             loads = list(self._zero_loads)
@@ -136,6 +139,7 @@ class SurrogateEngine(Engine):
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks per site."""
         found: list[BlastLoads | None] = [None] * len(blasts)
+        # Layouts of one site pass through the networks together.
         of_sites: dict[str, list[int]] = {}
         for number, blast in enumerate(blasts):
             of_sites.setdefault(blast.scenario.content_hash, []).append(number)

@@ -630,8 +630,8 @@ from tests.gas_sites import glazed_hut
 
 def loaded():
     physics = [vars(own) for name, own in sys.modules.items() if "env.gas" in name]
-    compiled = [each for own in physics for each in own.values() if isinstance(each, Dispatcher)]
-    return {(each.__name__, *each.signatures) for each in compiled if each.signatures}
+    kernels = [item for own in physics for item in own.values() if isinstance(item, Dispatcher)]
+    return {(kernel.__name__, *kernel.signatures) for kernel in kernels if kernel.signatures}
 
 import blast_env.app.warm
 warm = loaded()

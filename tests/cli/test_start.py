@@ -27,7 +27,7 @@ from blast_env.cli import app
 for name, command in typer.main.get_command(app).commands.items():
     assert "blast_env.cli." + name not in sys.modules, name
     command.loaded
-    found = [each for each in {SLOW} if each in sys.modules]
+    found = [module for module in {SLOW} if module in sys.modules]
     if found:
         print("imported:", name, *found)
 app(["draw", "--check-only", "courtyard"], standalone_mode=False)

@@ -18,7 +18,7 @@ from blast_env.bays import Bay
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas_validation import bay_validations
 from blast_env.evaluation.record import WallsWithoutVerdict
-from blast_env.evaluation.validation import VALIDATION_COLUMNS, Validation
+from blast_env.evaluation.validation import Validation
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
@@ -58,6 +58,12 @@ BAY_COLUMNS: Final = (
     Column("support_force_n_m", "N/m", "force per length of support of the wall panel"),
 )
 """One row per bay; values for components that a bay lacks are empty."""
+
+VALIDATION_COLUMNS: Final = (
+    Column("validation", "", "status of the load: measured, verified, approximate or outside"),
+    Column("reason", "", "reason for the status"),
+)
+"""The validation status of the load of a row."""
 
 LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN, *VALIDATION_COLUMNS)
 """One row per bay under a blast."""

@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, BayLoads, unjudged_walls
+from blast_env.evaluation.engines.bays import (
+    LOADED_BAY_COLUMNS,
+    VALIDATION_COLUMNS,
+    BayLoads,
+    unjudged_walls,
+)
 from blast_env.evaluation.engines.contract import (
     BlastDrawing,
     Engine,
@@ -34,7 +39,6 @@ from blast_env.evaluation.record import (
 )
 from blast_env.evaluation.validation import (
     NOT_KNOWN,
-    VALIDATION_COLUMNS,
     Validation,
     ValidationStatus,
     worst_validation,

@@ -169,6 +169,7 @@ class Blast(RunnableBlast):
         Args:
             progress: Called periodically with the elapsed share of the time limit.
         """
+        # In parts only for who watches the progress.
         run = self.start()
         limit_s = self.scene.parameters.stepping.time_limit_s
         while run.end_reason is None:
@@ -300,6 +301,7 @@ class BlastResult:
         """Return the loads on all structures, by the scenario's calibration or another one."""
         law = self.calibration if calibration is None else calibration
         structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
+        # Loads on structures need the calibration; those on modules stay in simulation units.
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
         named = {structure.name: structure for structure in self.blast.scenario.structures}
         return BlastLoads(
@@ -339,6 +341,7 @@ class BlastResult:
         Two runs have the same digest if and only if all collisions, module loads, remaining balls,
         the end time and the number of steps are the same to the last bit.
         """
+        # Collisions, loads of modules, remaining balls, end: all that a later step could differ by.
         state = sha256(self.collision_array.tobytes())
         loads = [
             (part.x, part.y, part.hits, part.impulse, part.transferred_impulse)

@@ -119,6 +119,8 @@ class Ladder:
             return self.charge._replace(tnt_kg=self.charge.tnt_kg * severity)
         there = self.charge.position_m
         x, y = nearest_point_m(self.scenario.loaded_walls, there)
+        # Equal scaled distances: R / W^(1/3) is the same for a mass s W at R and for W at R
+        # s^(-1/3).
         farther = severity ** (-1.0 / 3.0)
         place = (x + farther * (there[0] - x), y + farther * (there[1] - y))
         return self.charge._replace(position_m=place)
@@ -181,6 +183,7 @@ class Ladder:
             for (by_distance, number), blast in self._blasts.items()
             if blast is not None and (number == 0 or by_distance is nearer)
         }
+        # Scaling holds for small steps only, so the nearest rung in the logarithm.
         nearest = known[min(known, key=lambda number: abs(number - at))]
         return scaled_to(nearest, self.charge_at(severity, nearer))
 

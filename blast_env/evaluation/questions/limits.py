@@ -37,6 +37,7 @@ class Limit:
 
         One of the two may be left out. Other texts, and values not above 0, are refused.
         """
+        # An empty number is no limit; a text that is no number becomes -1, which no limit can be.
         name, sign, values = text.partition("=")
         parts = values.split(",")
         try:

@@ -16,10 +16,11 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_something_arrives
+from blast_env.evaluation.engines.bays import VALIDATION_COLUMNS
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.questions.grid_error import GridError, impulse_of
 from blast_env.evaluation.record import BlastLoads, BlastRecord, StructureLoad, on_buildings
-from blast_env.evaluation.validation import VALIDATION_COLUMNS, worst_validation
+from blast_env.evaluation.validation import worst_validation
 from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site

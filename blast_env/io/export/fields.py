@@ -81,6 +81,8 @@ def _with_opening(
     distance_m = np.sqrt(
         squares[0][:, None, None] + squares[1][None, :, None] + squares[2][None, None, :]
     )
+    # The running integral goes on from what the first stage left: the larger of its own maximum,
+    # and of that plus what came on the grid.
     net_pa_s, largest_pa_s = opening.impulses_pa_s(distance_m)
     peak_pa = np.maximum(found.peak_pa, opening.peak_pa(distance_m))
     return peak_pa, np.maximum(largest_pa_s, net_pa_s + found.impulse_pa_s)
@@ -116,6 +118,8 @@ class FieldSeries:
 
     def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
         """Keep the overpressure if a time is due."""
+        # One frame in each interval, by its number. Doubled intervals halve the numbers, of which
+        # the even ones are the first halves.
         number = int(solver.time_s / self._every_s)
         if number in self._frames:
             return

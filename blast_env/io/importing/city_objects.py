@@ -121,6 +121,7 @@ def city_objects(path: Path, documents: Sequence[Mapping[str, Any]]) -> dict[str
             f"{path}: version is {value_text(version)}, must be one of {', '.join(VERSIONS)}; "
             "convert it: cjio old.city.json upgrade save new.city.json"
         )
+    # Vertices are whole numbers, to be scaled and shifted (CityJSON 2.0, section 4).
     scale, shift = (_triple(path, head.get("transform"), name) for name in ("scale", "translate"))
     templates = _templates(path, head)
     found: dict[str, CityObject] = {}
@@ -213,6 +214,7 @@ def _geometry(
         BlastEnvError: If it is not as the format demands.
     """
     kind = geometry.get("type") if isinstance(geometry, dict) else None
+    # 1. A template, with its vertices where the instance puts it.
     if kind == _INSTANCE:
         return _geometry(at, *_instance(at, geometry, vertices, templates), None)
     if kind not in (*_SHELLS, *_LINES):
@@ -224,10 +226,12 @@ def _geometry(
     boundaries = geometry.get("boundaries")
     if not isinstance(boundaries, list):
         raise BlastEnvError(f"{at}: boundaries is missing or no array")
+    # 2. Lines and points have no surfaces; points are left out.
     if kind in _LINES:
         is_lines = kind == "MultiLineString"
         lines = [_ring(at, line, vertices) for line in boundaries if is_lines]
         return CityGeometry(lod, lines=tuple(line for line in lines if len(line) > 1))
+    # 3. Surfaces, each with its outer ring and its holes, and what it is.
     kinds, values = _semantics(geometry.get("semantics"))
     found, cavities = [], 0
     for surfaces, numbers, hollows in _shells(at, boundaries, values, _SHELLS[kind]):
@@ -236,6 +240,7 @@ def _geometry(
             rings = [_ring(at, ring, vertices) for ring in _array(at, surface)]
             number = numbers[k] if isinstance(numbers, list) and k < len(numbers) else None
             found.append((rings, _kind_of(kinds, number)))
+    # 4. Without those of fewer than three places, which files of real cities have.
     sound = [
         Surface((rings[0], *(hole for hole in rings[1:] if len(hole) >= _RING)), name)
         for rings, name in found
@@ -270,6 +275,8 @@ def _shells(
     at: str, boundaries: list[Any], values: Any, depth: int
 ) -> Iterator[tuple[list[Any], Any, int]]:
     """Yield the surfaces of each outer shell, their semantics, and the number of inner shells."""
+    # Boundaries nest by kind: a surface list, a shell of it (the first is the outer one), a solid
+    # of shells. Semantics nest in the same way, but for holes.
     if depth == 0:
         yield boundaries, values, 0
     elif depth == 1:

@@ -72,6 +72,8 @@ class HeightReader:
         The top is `None` if it is not known. An unreadable height does not hide a number of
         storeys. Of several numbers the largest counts.
         """
+        # 1. The underside; 2. the top as a height, if the options name no other key; 3. else
+        # storeys, with a roof by its height or its storeys.
         own = self.site_map.options.height_from
         lower = {str(name).lower(): value for name, value in feature.tags.items()}
         reading = _Reading(self, lower, feature.place)
@@ -120,6 +122,7 @@ class _Reading:
 
     def storeys_m(self, keys: tuple[str, ...], more: tuple[str, ...] = ()) -> float | None:
         """Return the height of the first readable number of storeys, and of more of them, m."""
+        # Storeys below the roof and in it.
         counts = [self._storeys(keys), self._storeys(more)]
         known = [count for count in counts if count is not None]
         total = sum(known) * self.reader.site_map.options.level_height_m
@@ -138,6 +141,7 @@ class _Reading:
 
     def _unit(self, key: str) -> tuple[float, str]:
         """Return the unit of plain numbers of a key, m, with the remark if that is a guess."""
+        # A key with a unit, then New York, then the unit of the options or of the file.
         if key.endswith(("_ft", "_feet")):
             return FOOT_M, ""
         if key.endswith("_m"):

@@ -117,6 +117,7 @@ class _Model:
 
     def read(self) -> None:
         """Add the buildings, the walls of the site, and all else with the reason."""
+        # 1. What has a shape, with windows that are made of frames and panes.
         windows = [
             product for product in self._model.by_type("IfcWindow") if not product.Representation
         ]
@@ -129,10 +130,12 @@ class _Model:
         solids = {
             product.element.id(): product for product in self._solids([*(chosen | panes).values()])
         }
+        # 2. Whose it is: by storey and building, else the only building there is.
         owners = {product.id(): self._owner(product) for product in self._products}
         if not any(owners[key] for key in solids) and len(self._buildings) == 1:
             owners = dict.fromkeys(owners, self._buildings[0])  # all hangs at the site
         used = set(self._join(windows, solids))
+        # 3. Each building from its own; the rest of the site on the lowest of their grounds.
         reasons, grounds_m = dict[int, str](), list[float]()
         for entity in self._buildings:
             own = [product for key, product in solids.items() if owners[key] == entity]
@@ -143,6 +146,7 @@ class _Model:
         lonely = [product for key, product in solids.items() if owners[key] is None]
         used |= self._add_of_site(lonely, min(grounds_m, default=0.0))
         for product in self._products:
+            # 4. Nothing is lost in silence: all that is not read is on the ledger.
             if product.id() not in used:
                 self._leave(product, solids.get(product.id()), reasons.get(product.id(), ""))
 
@@ -152,6 +156,7 @@ class _Model:
         if not elements:
             return
         settings = ifcopenshell.geom.settings()
+        # Shapes come in metres, whatever the unit of the file.
         settings.set("use-world-coords", True)
         iterator = ifcopenshell.geom.iterator(settings, self._model, include=elements)
         more = iterator.initialize()
@@ -194,6 +199,7 @@ class _Model:
         return found
 
     def _building(self, entity: Any, solids: list[Solid]) -> Building:
+        # Heights are stated in the unit of the file, at four places that need not agree.
         base_m = self._placed_m(entity)
         storeys = [
             storey

@@ -208,6 +208,7 @@ def fit_power_law(i_sim: Numbers, i_reference: Numbers) -> PowerLaw:
     """
     x, y = _checked_pair(i_sim, i_reference)
     checked_array("i_sim", x, above=0.0)
+    # ln i = ln A + B ln i_sim is a line.
     intercept, exponent = _line(np.log(x), np.log(y))
     return PowerLaw(A=float(np.exp(intercept)), B=exponent)
 
@@ -342,6 +343,7 @@ def leave_one_out(
     distance = _checked_distances(distance_m, least_count=3)
     simulated = _checked_column("i_sim", i_sim, len(distance), least=0.0)
     reference = _checked_column("i_reference", i_reference, len(distance), above=0.0)
+    # 1. All distances once, so that their faults are named without "left out".
     fit(simulated, reference)  # warnings and errors of the fit to all distances
     laws = []
     with _quiet():
@@ -350,6 +352,7 @@ def leave_one_out(
                 laws.append(fit(np.delete(simulated, index), np.delete(reference, index)))
             except BlastEnvError as error:
                 raise BlastEnvError(f"without the distance {left_out_m:g} m: {error}") from error
+    # 2. Each distance by the law that has not seen it.
     predicted = np.array([law(float(x)) for law, x in zip(laws, simulated, strict=True)])
     return LeaveOneOut(
         distance_m=distance,

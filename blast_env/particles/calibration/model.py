@@ -193,11 +193,15 @@ class Calibration(CalibrationSection):
             distance_m: Distance from the charge's centre to the structure.
             tnt_kg: TNT-equivalent mass of the charge.
         """
+        # 1. The impulse that the reference facade would have collected.
         margin_m = 2.0 * self.ball_radius_m
         share = (self.facade_width_m + margin_m) / (seen_width_m + margin_m)
         low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
+        # 2. The law at the reference mass: impulse and distance over the cube root of the ratio of
+        # masses (Hopkinson & Cranz), and the result times it.
         scale = 1.0 if self.tnt_range_kg is None else (tnt_kg / self.tnt_kg) ** (1.0 / 3.0)
         psi_s = scale * self.scaling_law(share * impulse_sim / scale)
+        # 3. Whether this is inside what was fitted.
         notes = []
         first_m, last_m = scale * self.distances_m[0], scale * self.distances_m[-1]
         if not first_m <= distance_m <= last_m:
@@ -234,6 +238,7 @@ def _seen_width_m(obstacle: "ModularObstacle", charge_m: tuple[float, float]) ->
         np.concatenate((left, right, left, right)),
         np.concatenate((bottom, bottom, top, top)),
     )
+    # Distances from the line to the centre: the extent of all corners across it.
     across_m = ((x_m - x0) * (y1 - y0) - (y_m - y0) * (x1 - x0)) / hypot(x1 - x0, y1 - y0)
     return float(np.ptp(across_m))
 
@@ -280,17 +285,7 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
     """
     path = path_of(name_or_path)
     if path.suffix != SUFFIX:
-        name = str(name_or_path)
-        engines = calibrated_engines(name)
-        if not engines:
-            raise UnknownNameError("calibration", name, stored_calibrations())
-        engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
-        if engine not in engines:
-            raise CalibrationError(
-                f"calibration {name!r} was not made for engine {engine!r}, only for "
-                f"{', '.join(engines)}"
-            )
-        return _of_the_package(name, engine).model_copy(deep=True)
+        return _of_the_package(str(name_or_path), engine).model_copy(deep=True)
     try:
         return _parsed(read_text(path))
     except DocumentError as error:
@@ -298,7 +293,16 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
 
 
 @cache
-def _of_the_package(name: str, engine: str) -> Calibration:
+def _of_the_package(name: str, engine: str | None) -> Calibration:
+    engines = calibrated_engines(name)
+    if not engines:
+        raise UnknownNameError("calibration", name, stored_calibrations())
+    engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
+    if engine not in engines:
+        raise CalibrationError(
+            f"calibration {name!r} was not made for engine {engine!r}, only for "
+            f"{', '.join(engines)}"
+        )
     entry = files("blast_env.particles.calibration") / "stored" / calibration_file(name, engine)
     return _parsed(entry.read_text(encoding="utf-8"))
 
@@ -339,10 +343,12 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
 @cache
 def _stored_files() -> tuple[tuple[str, str], ...]:
     """Return name and engine of the calibrations in the package."""
-    folder = files("blast_env.particles.calibration") / "stored"
-    stems = (entry.name.removesuffix(SUFFIX) for entry in folder.iterdir())
-    pairs = (stem.rpartition(".") for stem in stems)
-    return tuple((name, engine) for name, _, engine in pairs if name)
+    found = []
+    for entry in (files("blast_env.particles.calibration") / "stored").iterdir():
+        name, _, engine = entry.name.removesuffix(SUFFIX).rpartition(".")
+        if name:
+            found.append((name, engine))
+    return tuple(found)
 
 
 def _parsed(text: str) -> Calibration:
