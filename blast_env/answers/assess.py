@@ -79,6 +79,7 @@ def assessment(
     """
     scenario, judged = blasts.scenario, found[blasts.judged]
     yield from _verdict(blasts, judged, target)
+    # The layout in question before the site without it.
     judged_first = [*found.items()][::-1]
     for requirement in required:
         for name, own in judged_first:

@@ -251,6 +251,7 @@ class Guard:
 
         Not an HTTP redirect: a browser that came from another page would send no cookie with it.
         """
+        # A leading double slash would be another host.
         path = quote("/" + asked.scope["path"].lstrip("/\\"))
         rest = urlencode(
             [

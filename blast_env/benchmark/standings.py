@@ -70,6 +70,7 @@ def _table(judged: Sequence[SubmissionJudgement], problems: Sequence[str], cell_
     entries = [
         (entry, budget) for entry in judged for budget in sorted({run.budget for run in entry.runs})
     ]
+    # One p value for each row, adjusted for the number of rows.
     chances = holm_adjusted([entry.lead_p_value(budget) for entry, budget in entries])
     for (entry, budget), chance in zip(entries, chances, strict=True):
         seeds = len({run.seed for run in entry.runs if run.budget == budget})
@@ -82,6 +83,7 @@ def _table(judged: Sequence[SubmissionJudgement], problems: Sequence[str], cell_
             " ".join((f"{score.value:.2f}", _ends(score, "{:.2f}"))).rstrip(),
         )
         found.append((lead.value, score.value, row))
+    # Rounded, so that rows equal but for their last bits keep their order.
     found.sort(key=lambda entry: (round(entry[0], 9), round(entry[1], 9)), reverse=True)
     names = ", ".join(problems)
     if set(problems) == set(DEFINITIONS):

@@ -262,6 +262,7 @@ class GasRun:
 def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
     """Return the grid with its solid cells."""
     cell_m = settings.smallest_m
+    # 1. Whole cells that cover the site and its margin, as many as can be halved in number later.
     margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site_m.left, site.site_m.bottom])
     high = np.array([site.site_m.right, site.site_m.top])
@@ -277,6 +278,7 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
         buffer_layers=buffer_layers,
     )
     grid = replace(grid, solid=np.zeros(shape, dtype=bool))
+    # 2. A cell is solid if its centre is in a module.
     z_m = grid.centres_m(2)
     for outline in site.structures:
         row, column = _modules_at(outline, grid)

@@ -324,11 +324,14 @@ class GasSolver:
         """Make one time step, of at most `most_s`."""
         if self._signal == 0.0:
             self._signal = float(state.fastest_signal(self.state))
+        # 1. The step by the Courant number, ramped over the first steps: waves of a discontinuous
+        # start are faster than its states tell.
         share = min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * self.steps / _FIRST_STEPS)
         reduced = share * self._courant * self.grid.cell_m / self._signal
         step_s = min(reduced / self.velocity_m_s, most_s)
         ratio = self.state.dtype.type(step_s * self.velocity_m_s / self.grid.cell_m)
         self._notes[:] = 0.0
+        # 2. The sweeps, in the reverse order in every other step (Strang).
         sweeps = _SWEEPS[self.steps % len(_SWEEPS)]
         for axes in sweeps:
             cells = self._sweep(axes, ratio, last=axes == sweeps[-1])
@@ -337,6 +340,7 @@ class GasSolver:
             state.tighten(self.state, self._still, self.extent)
         if self._burning is not None:
             self._burn(self._burning, step_s)
+        # 3. The fastest signal, for the next step; that of still air where all is at rest.
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
         self._floored_cells += int(self._notes[:, 1].sum())
         self.steps += 1

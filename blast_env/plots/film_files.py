@@ -203,6 +203,7 @@ def _save_mp4(
                 raise BlastEnvError("the film cannot be written: ffmpeg has ended") from error
             count += 1
     try:
+        # A full disk ends ffmpeg without an error: count what can be read again.
         found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
     except RuntimeError as error:
         raise BlastEnvError("the film cannot be written: it cannot be read again") from error

@@ -236,6 +236,8 @@ def with_resolution(parameters: SimulationParameters, factor: float) -> Simulati
         pydantic.ValidationError: If another value is out of bounds.
     """
     air, explosive, contact = parameters.air, parameters.explosive, parameters.contact
+    # The same air and charge in smaller balls: the mass of an air ball falls with its area, so that
+    # the mass per area stays, and more balls share the mass of the charge.
     count = round(explosive.ball_count * factor)
     return with_overrides(
         parameters,

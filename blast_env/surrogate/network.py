@@ -401,6 +401,8 @@ class Surrogate:
         self, site: SurrogateSite, approach: Approach, layouts: Sequence[Sequence[Box]]
     ) -> tuple[PieceKnowledge, Numbers]:
         """Return what is known of the pieces of layouts under one charge, and their numbers."""
+        # What pieces say to points depends on piece and charge alone: it is kept, and layouts that
+        # share pieces share it.
         kinds = self._of_loads if site.counts_peaks else self._of_loads[:1]
 
         def sent(related: FloatArray) -> list[SingleArray]:

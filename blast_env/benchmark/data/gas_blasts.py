@@ -80,6 +80,7 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
         tables.append(own.assign(table=path_of(path).stem))
     rows = pd.concat(tables, ignore_index=True)
     keys = [*_BLAST, "structure"]
+    # Each row beside the same blast without a barrier, if the table has it.
     unprotected = rows.loc[rows["layout"] == "[]", [*keys, *_LOADS]].drop_duplicates(keys)
     rows = rows.merge(
         unprotected.rename(columns={load: f"unprotected_{load}" for load in _LOADS}), "left", keys

@@ -227,6 +227,7 @@ class PieceLoads:
         return table_of(rows, PIECE_COLUMNS)
 
     def _row(self, piece: int, end_s: float) -> dict[str, object]:
+        # The way of loading that moves it most; loads are per metre, sums for the whole piece.
         row, found, body = self._worst[piece], self.responses, self.bodies[piece]
         rectangle = self.zone.element_rectangle_m(self.elements[piece])
         length_m = max(rectangle.right - rectangle.left, rectangle.top - rectangle.bottom)

@@ -192,6 +192,7 @@ def _building_load(
     histories: WallHistories,
 ) -> BuildingLoad:
     """Return the load on a building from its row in the table of buildings."""
+    # The mean is over all counted walls, the history that of the most loaded one.
     faces, wall = result.on_walls, row["most_loaded_face"]
     counting = [
         (faces["structure"] == counted_part.name) & faces["face"].isin(counted_part.faces)

@@ -480,6 +480,7 @@ class Evaluation:
         from blast_env.particles.structure import obstacle_of
         from blast_env.particles.tables import module_table
 
+        # Means over the threats, module by module, in the order of the scene.
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
         first = self.blasts.records[self.blasts.judged][0].loads

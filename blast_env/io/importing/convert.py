@@ -253,6 +253,7 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
 
 def _structures(building: BuildingFit, buildings: tuple[BuildingFit, ...]) -> list[dict[str, Any]]:
     """Return the structures of a building; with its parts they have a total weight of 1."""
+    # Weights by the area of walls: together the parts of a building count once.
     group = [other for other in buildings if other.group == building.group]
     walls = [(other, part.polygon.length) for other in group for part in other.polygons]
     whole = sum(length_m * other.wall_height_m for other, length_m in walls)

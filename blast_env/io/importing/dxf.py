@@ -267,6 +267,8 @@ class _Drawn:
                 handle = _handle(entity) or f"no. {number}"
                 own = handle if part is entity else f"{handle}/{number}"
                 place = f"{_kind(part)} {own} on the layer {named(layer)}"
+                # Faces are parts of a surface: collected by layer and insert, and read together
+                # below.
                 if isinstance(part, Face3d) and not _is_hidden(part):
                     corners = np.array([tuple(wcs_vertex) for wcs_vertex in part.wcs_vertices()])
                     self._check(corners, place)

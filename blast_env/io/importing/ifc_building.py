@@ -204,6 +204,7 @@ class Building:
         is_sure = words == "where it is placed"
         fate = Fate.NOTED if is_sure else Fate.GUESSED
         ledger.add(fate, _GROUND, self.place, self.name, f"at {ground_m:g} m, {words}")
+        # What is narrower than a module is cut off, and said.
         lost_m2 = self._shadow.area - self._outline.area
         if lost_m2 > _LEAST_M2:
             ledger.add(Fate.CUT, _NARROW, self.place, self.name, f"{lost_m2:.1f} m2")

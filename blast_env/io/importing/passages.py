@@ -43,6 +43,7 @@ def mouths_of(site: SitePlacement, buildings: Sequence[BuildingFit], free: BaseG
     for street in site.of_role(Role.CHARGE):
         if not street.is_line:
             continue
+        # 1. The buildings that a street really crosses.
         crossed = [
             buildings[index]
             for index in sorted(tree.query(street.geometry, "intersects").tolist())
@@ -54,6 +55,7 @@ def mouths_of(site: SitePlacement, buildings: Sequence[BuildingFit], free: BaseG
         detail = f"through {', '.join(building.name for building in crossed)}"
         kind = _SOLID if is_solid else _RAISED
         site.ledger.add(Fate.GUESSED, kind, street.place, street.name, detail)
+        # 2. Where it leaves them, taken together, and a free place before each mouth.
         built = shapely.union_all([building.outline for building in crossed])
         ends = _ends(_inside(street, built), built)
         ahead = (_ahead(end, way, free) for end, way in ends)

@@ -431,6 +431,7 @@ def _rules(scene: Scene, cell_units: float) -> Record:
         rules[name] = getattr(scene.site, name)
     rules["cell_units"] = cell_units
     rules["columns"] = floor((scene.site.right - scene.site.left) / cell_units) + 3
+    # Chipmunk multiplies what both sides have: for air and air, air and charge, charge and charge.
     for name, of_air, of_explosive in (
         ("restitution", air.elasticity, explosive.elasticity),
         ("friction", air.friction, explosive.friction),

@@ -325,6 +325,8 @@ class PymunkRun:
         tangential speed counts only at the beginning of the contact.
         """
         mass, normal = float(self._mass[touch.ball]), touch.outward_normal
+        # The normal velocity before, from the impulse that the solver found: J = (1 + e) m v_n. The
+        # tangential one is that at the touch, unless the ball rested there.
         velocity = normal * (-to_module / ((1.0 + self._contact.module_restitution) * mass))
         if not touch.is_lasting:
             velocity += touch.velocity - normal * touch.velocity.dot(normal)

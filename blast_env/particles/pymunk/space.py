@@ -80,6 +80,8 @@ class PymunkSpace:
         Returns:
             The indices of the modules that are new in the space.
         """
+        # 1. Modules that are gone, or no longer at the surface; 2. those that have come to it; 3.
+        # the faces and corners of all, which have changed with their neighbours.
         centres = np.array([(part.x, part.y) for part in self.parts]).reshape(-1, 2)[standing]
         surface = wall_surface(centres)
         kept = set(standing.tolist())
