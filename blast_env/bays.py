@@ -85,6 +85,8 @@ def floors_m(rise_m: float, storey_m: float = STOREY_M, storeys: int | None = No
     """
     if storeys is not None:
         storey_m = rise_m / storeys
+    # As many whole storeys as fit; what is left over is on the ground floor, where entrances are
+    # high.
     count = max(1, floor(rise_m / storey_m + _ROUNDING))
     ground_m = max(rise_m - storey_m * (count - 1), storey_m)
     return [0.0] + [ground_m + storey_m * number for number in range(count - 1)]
@@ -145,6 +147,7 @@ def divide(
     for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):
         if not value > 0.0:
             raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
+    # 1. Floors; 2. along each wall, bays of equal width; 3. one bay for each floor and part.
     levels_m = floors_m(rise_m, storey_m, storeys)
     floors = [base_m + level_m for level_m in levels_m] + [height_m]
     bays: list[Bay] = []

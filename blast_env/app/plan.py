@@ -385,6 +385,7 @@ def _ghost(view: PixelView, ghost: Ghost) -> list[str]:
     colour = _REFUSED if ghost.reason else _FITS
     dash = "4 3" if ghost.reason else ""
     parts = []
+    # A line that is being drawn, or the rectangle of a piece, crossed out where it cannot stand.
     if ghost.line_m is not None:
         (x0, y0), (x1, y1) = (view.pixel(*place) for place in ghost.line_m)
         parts.append(

@@ -28,6 +28,8 @@ def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
     Of a line: the middle and the ends; of an area: the middle and the corners; of a vehicle: the
     nearest place that the layout leaves it, and the next ones by distance.
     """
+    # Ends and middle of a line, corners and middle of an area: the extremes of distance to any wall
+    # lie among them or near.
     named: list[LoadCase] = []
     for index, source in enumerate(scenario.charge):
         places: list[tuple[str, PointM]]

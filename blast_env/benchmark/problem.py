@@ -160,6 +160,7 @@ class BenchmarkProblem(DesignProblem):
         count = most if threats is None else threats
         if not 1 <= count <= most:
             raise BlastEnvError(f"threats is {count}, must be 1 to {most}")
+        # 1. What it costs: a layout that changes no load is known.
         checked = tuple(sorted(check_layout(self.scenario, layout)))
         pairs: list[tuple[Layout, LoadCase]] = [
             (checked, threat) for threat in self.case.threats[:count] if load_relevant(checked)
@@ -172,9 +173,11 @@ class BenchmarkProblem(DesignProblem):
                 f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
                 f"{self.budget} are left"
             ) from None
+        # 2. A method that asks for known layouts only would never end.
         self._repeats = self._repeats + 1 if self.blasts == before else 0
         if self._repeats > _MOST_REPEATS:
             raise BudgetError(f"{self.name}: {_MOST_REPEATS} evaluations without a new blast")
+        # 3. The share under the first threats, for methods that look closer at the best.
         met = replace(self.case, threats=self.case.threats[:count])
         (share,) = shares_of(met, [checked], self.evaluator)
         self.history.append(LayoutValue(checked, share, count, self.blasts))

@@ -93,9 +93,12 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
         response_s: Minimum duration of the run after the last load has arrived.
     """
     scale = cbrt(site.charge.tnt_kg / 100.0)
+    # 1. How long it runs: until sound has been everywhere that counts, and a while after.
     watched = watched_structures(site, settings.until)
     end_s = sound_s(site, corners_m(site, watched)) + max(_AFTER_S * scale, response_s)
     part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
+    # 2. Part by part: how far the front is, ahead of sound at first; the cells behind it, which are
+    # those that move; and the step, which the hot products keep short.
     left_m, bottom_m, right_m, top_m = site.site_m
     sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
     x_m, y_m = site.charge.position_m
@@ -110,6 +113,7 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
         run = front_m / cell_m + 1.0
         steps += part_s / step_s
         moved += part_s / step_s * _cells_behind(run, counts, place)
+    # 3. Memory is that of all cells at their smallest.
     cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
     return CostGuess(cells, ceil(steps), _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
 
@@ -130,6 +134,8 @@ def _cells_behind(run: float, counts: tuple[int, ...], place: tuple[float, float
     low, high, top = -min(front, run), min(back, run), min(float(counts[2]), run)
     shares = (np.arange(_ROWS) + 0.5) / _ROWS
     beside, above = np.meshgrid(low + (high - low) * shares, top * shares)
+    # Half of each row inside the ball, cut off at the site on both sides; their mean times the area
+    # of the section.
     half = np.sqrt(np.maximum(run**2 - beside**2 - above**2, 0.0))
     return float((np.minimum(left, half) + np.minimum(right, half)).mean()) * (high - low) * top
 

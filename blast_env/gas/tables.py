@@ -153,6 +153,7 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
 
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
     """Group faces: area means of impulses, largest peaks, first arrivals."""
+    # By area: impulses and what is known are means, peaks the largest, arrivals the first.
     means = ["impulse_pa_s", "known"]
     weighed = faces.assign(**{mean: faces[mean] * faces["share"] for mean in means})
     groups: Any = weighed.groupby(keys, sort=False, observed=True)
@@ -174,6 +175,7 @@ def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
         run, faces.assign(share=1.0), ["structure", "module_id", "row", "column", "face"]
     )
     outlines = run.site.structures
+    # Centres of modules, from the corner of the grid of their structure.
     corners = {outline.name: outline.corner_m for outline in outlines}
     left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
     table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
@@ -195,6 +197,7 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
         run: The run.
         faces: Its `face_table`, whose column `share` is the area ratio of real wall to face.
     """
+    # The barrier has no walls of its own: its pieces stand for themselves.
     counting = {own.name: own.faces for own in run.site.structures if not own.is_barrier}
     own = faces[faces["structure"].isin(list(counting))]
     table = _grouped(run, own, ["structure", "face"])
@@ -249,6 +252,8 @@ def _structure_row(
     counting = [(structure == part.name) & face.isin(part.faces) for part in counted]
     walls = faces[np.logical_or.reduce(counting)]
     roof = faces[structure.isin([part.name for part in counted]) & (face == ROOF)]
+    # The mean over all counted walls may hide one that is hit hard: the most loaded one stands
+    # beside it.
     of_walls = means_by_wall(walls, "impulse_pa_s")
     return {
         "structure": name,

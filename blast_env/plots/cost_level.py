@@ -65,6 +65,8 @@ def cost_level_figure(
     every = [point for points in tried.values() for point in points]
     most = max((point.cost for point in every), default=0.0) or 1.0
     _draw_levels(axes, target, most)
+    # The front of those that no other beats in both, as steps: between two points the cheaper one
+    # is what can be had.
     front = cheapest(every)
     ends = [*front, DamagePrice(most, front[-1].damage)]
     grey = unit_interval(QUIET_INK)

@@ -199,9 +199,11 @@ def facades(
     walls = [
         {wall: _wall(result, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for result in results
     ]
+    # One scale for all walls and both blasts, so that colours compare.
     end = _full(walls) if full is None else full
     scale = Normalize(0.0, end)
     lengths = np.array([_length_m(outline, wall) for wall in _LEFT_TO_RIGHT])
+    # Walls as wide as they are long, but short ones wide enough for their axes.
     widths = np.maximum(lengths, _LEAST_WALL_SHARE * lengths.sum())
     height_m = outline.height_m
     low, high = _WALL_HEIGHTS_IN

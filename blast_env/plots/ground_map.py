@@ -192,6 +192,8 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
         shown.set_clip_path(axes.patches[0])
         charge = item.run.site.charge
         for threshold in thresholds:
+            # Beside what the cells give, which clip peaks, the distance on open ground by the
+            # curves.
             distance_m = open_distance_m(threshold.peak_pa, charge)
             if isfinite(distance_m):
                 _add_circle(axes, charge, distance_m, **_OPEN_STYLE)

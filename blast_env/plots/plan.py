@@ -314,6 +314,7 @@ def site_features(
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
         barriers = [*barrier_features(scenario, layout)]
+        # Cells that may be built on end where structures and pieces stand.
         found += zone_features(
             zone,
             [box for structure in there for box in structure.boxes_m],
@@ -534,6 +535,7 @@ def barrier_features(scenario: Scenario, layout: Sequence[Element]) -> Iterator[
             )
             yield replace(feature, fill=colours[piece.item], words=words[piece.item])
         return
+    # Single modules, one feature each.
     outline = barrier_outline(scenario, tuple(layout))
     for row, column in outline.filled:
         rectangle_m = zone.element_rectangle_m((row, column))

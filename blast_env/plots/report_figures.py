@@ -202,6 +202,7 @@ def worth_map(scenario: Scenario, worths: Sequence[tuple[Element, float]]) -> by
     draw_plan(axes, features)
     points = 100.0 * np.array([worth for _, worth in worths])
     reach = max(float(np.abs(points).max()), 1e-6)
+    # White is no worth; a piece that does harm has the other colour, on the same scale.
     scale = TwoSlopeNorm(0.0, -reach, reach)
     sides_m = [scenario.zone.element_rectangle_m(element) for element, _ in worths]
     squares = [rectangle_patch(rectangle_m) for rectangle_m in sides_m]
@@ -211,6 +212,7 @@ def worth_map(scenario: Scenario, worths: Sequence[tuple[Element, float]]) -> by
     axes.add_collection(modules)
     sides = np.array(sides_m)
     low, high = sides[:, :2].min(axis=0), sides[:, 2:].max(axis=0)
+    # The picture is of the barrier and its surroundings, inside the site.
     reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
     (left, bottom), (right, top) = low - reach_m, high + reach_m
     axes.set_xlim(max(left, 0.0), min(right, scenario.site.width_m))

@@ -101,6 +101,7 @@ def _draw_rings(
     }
     site = scenario.site
     most_m = _BEYOND * max(site.width_m, site.height_m)
+    # 1. The plan shows the farthest stand-off, within bounds.
     reach_m = min(
         max((distance for distance in needed_m.values() if isfinite(distance)), default=0.0), most_m
     )
@@ -109,6 +110,8 @@ def _draw_rings(
     axes.set_ylim(-reach_m, site.height_m + reach_m)
     axes.set_facecolor(_pale(LevelOfProtection.HIGH))
     handles = [_patch(LevelOfProtection.HIGH, needed_m, found, threat)]
+    # 2. The wide rings first: each covers the middle of the one before, in the colour of what is
+    # left there.
     for level in _LEVELS:
         below = LevelOfProtection(level - 1)
         distance_m = min(needed_m[level], 4.0 * max(site.width_m, site.height_m))

@@ -104,6 +104,7 @@ class RigidPiece:
         Raises:
             BlastEnvError: If one is out of bounds.
         """
+        # A piece without height, base or mass has no motion to compute.
         for name in ("height_m", "base_m", "mass_kg_m"):
             value = getattr(self, name)
             if not 0.0 < value < np.inf:

@@ -83,6 +83,8 @@ class TriangularLoads:
         """
         if not self._bays:
             return ()
+        # Bays that are alike respond alike under one load: each kind once. The triangle of a peak
+        # and an impulse lasts 2 i / p.
         end_s = 2.0 * impulse_pa_s / peak_pa if peak_pa > 0.0 else 1e-3
         time_s = np.array([0.0, end_s, 2.0 * end_s])
         pressure_pa = np.tile([peak_pa, 0.0, 0.0], (len(self._alike), 1))

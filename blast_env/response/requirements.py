@@ -42,6 +42,7 @@ class Requirement:
 
     def kept_by(self, found: FacadeResponse) -> bool:
         """Return whether every bay of a facade keeps it."""
+        # The worst pane and the worst panel of all bays, and the largest loads.
         glass, walls = found.glazing.hazard.max(initial=0.0), found.walls.damage.max(initial=0.0)
         impulse_pa_s = impulses(found.time_s, found.pressure_pa).max(initial=0.0)
         return bool(

@@ -72,6 +72,8 @@ class Limits:
 
 
 def _measure(values: FloatArray, limits: Sequence[float | None], first: int) -> FloatArray:
+    # Linear between the limits that there are; beyond the last one 1 - limit / value, which tends
+    # to the next number.
     at = [(0.0, float(first))]
     at += [(limit, level) for level, limit in enumerate(limits, start=1) if limit is not None]
     known, levels = (np.array(coordinate) for coordinate in zip(*at, strict=True))
@@ -184,6 +186,7 @@ class ReinforcedConcrete(_Section):
 
     @property
     def _depth_m(self) -> float:
+        # A cover beyond half of the thickness is that of the other face.
         return max(self.thickness_m - self.cover_m, 0.5 * self.thickness_m)
 
     @property
@@ -193,6 +196,8 @@ class ReinforcedConcrete(_Section):
 
     def moment_at(self, rotation_deg: float) -> float:
         """Return the moment per metre of width that it has at a support rotation, N."""
+        # Equilibrium: the force of the tension steel against a block of concrete at 0.85 f_c, and
+        # its arm to the middle of that block.
         force = self.steel_share * self._depth_m * self.design_stress_pa(rotation_deg)
         block_m = force / (0.85 * self.concrete_pa * self.dynamic_increase)
         return force * (self._depth_m - 0.5 * block_m)
@@ -219,6 +224,8 @@ class ReinforcedConcrete(_Section):
     @property
     def bending_stiffness_n_m(self) -> float:
         """E I, the mean of the uncracked and cracked sections."""
+        # E_c = 4,700 sqrt(f_c) in MPa (ACI 318). The neutral axis of the cracked section balances
+        # the first moments of area, x^2 / 2 = n rho d (d - x).
         concrete_e = 4700e6 * np.sqrt(self.concrete_pa / 1e6)
         ratio = 200e9 / concrete_e
         share = ratio * self.steel_share

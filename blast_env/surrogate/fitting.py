@@ -384,6 +384,8 @@ def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
         count: Number of folds.
         seed: Seed of the order.
     """
+    # Sites or layouts are dealt out whole, so that no fold knows a neighbour of what it is tried
+    # on.
     distinct = np.random.default_rng(seed).permutation(np.unique(numbers))
     return [np.isin(numbers, distinct[first::count]) for first in range(count)]
 

@@ -68,6 +68,7 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
         source.least_apart_m,
         _EQUAL_M,
     )
+    # Of all loaded walls the nearest counts.
     of_chosen_m = distances_m[:, chosen].min(axis=0, initial=np.inf)
     places = tuple((x_m, y_m) for x_m, y_m in places_m[chosen].tolist())
     return WorstPlaces(source, places, tuple(of_chosen_m.tolist()))

@@ -43,6 +43,7 @@ def _check(title: str, texts: Iterable[str]) -> Iterator[AnyPart]:
 def _stand_off(study: Study) -> Iterator[AnyPart]:
     threat, scenario = study.threats[0], study.scenario
     charge = threat.charge_against(scenario)
+    # 1. The nearest protected building, by its outline in plan.
     outlines = {
         name: Rectangle.around([part.rectangle_m for part in parts])
         for name, parts in buildings_of(scenario.structures).items()
@@ -53,6 +54,8 @@ def _stand_off(study: Study) -> Iterator[AnyPart]:
     }
     building = min(distances_m, key=distances_m.__getitem__)
     away_m = distances_m[building]
+    # 2. The scaled distance; 3. the curves there, if they reach so far; 4. beside the load by gas
+    # dynamics.
     scale = float(np.cbrt(charge.tnt_kg))
     texts = [
         f"{threat.name}: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:g},"

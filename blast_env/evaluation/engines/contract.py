@@ -296,6 +296,7 @@ def default_engine(use: str, *scenarios: Scenario) -> str:
         use: The id of an environment, or a command.
         scenarios: The sites.
     """
+    # A site that states heights means them.
     if any(scenario.height_notes for scenario in scenarios):
         return JUDGE
     return PAPER_ENGINES.get(use, JUDGE)

@@ -132,6 +132,7 @@ def _structure_row(
 
 def charge_values(charge: Charge) -> dict[str, object]:
     """Return the values of `CHARGE_COLUMNS`."""
+    # In the order of the columns.
     values = (*charge.position_m, charge.height_m, charge.tnt_kg)
     return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
 
@@ -283,6 +284,7 @@ class Evaluation:
     @cached_property
     def case_reductions(self) -> FloatArray:
         """The reduction in each case (cases,)."""
+        # Without a barrier nothing is bought, and no cost counts.
         unprotected = self._of_cases(self.unprotected, [()] * len(self.cases))
         return reductions(self._of_cases(self.loads, self.layouts), unprotected)
 

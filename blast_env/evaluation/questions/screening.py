@@ -294,6 +294,7 @@ def stand_offs(
 
     The charge may be at any place. The height of a storey is the span of walls.
     """
+    # One charge: every component is held against the same curves.
     curves = _Curves(charge)
     found = []
     for name, component in components.items():

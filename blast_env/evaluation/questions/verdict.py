@@ -138,6 +138,7 @@ class BuildingResponse:
     def deciding_bay(self) -> int:
         """The index of the bay with the worst component."""
         facade = self.facade
+        # Panes and panels have damage on the same scale.
         glass, walls = facade.glazing.hazard, facade.walls.damage
         worst_glass, worst_wall = (float(own.max(initial=-1.0)) for own in (glass, walls))
         if worst_glass >= worst_wall:
@@ -162,6 +163,7 @@ class BuildingResponse:
     def severity(self) -> Severity:
         """Severity of the response; its load is the mean impulse on the bays by area, Pa s."""
         facade = self.facade
+        # In this order: the level lost, then the damage of all, then the load.
         impulses_pa_s = impulses(facade.time_s, facade.pressure_pa).max(axis=1)
         areas_m2 = [bay.bay.area_m2 for bay in facade.bays]
         return Severity(

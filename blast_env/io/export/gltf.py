@@ -60,6 +60,7 @@ def write_glb(meshes: Sequence[Mesh], path: Path, name: str, extras: Mapping[str
     Raises:
         BlastEnvError: If the file cannot be written.
     """
+    # glTF 2.0: a header, a chunk of JSON and a chunk of numbers (Khronos, section 4, GLB).
     shown = [mesh for mesh in meshes if len(mesh.triangles_m)]
     buffer = _Buffer()
     document = {
@@ -88,6 +89,7 @@ def write_glb(meshes: Sequence[Mesh], path: Path, name: str, extras: Mapping[str
         "buffers": [{"byteLength": len(buffer.content)}],
     }
     text = json.dumps(document, allow_nan=False).encode()
+    # Chunks begin at multiples of four bytes: the JSON is filled up with spaces.
     text += b" " * (-len(text) % _ALIGNMENT)
     chunks = b"".join(
         struct.pack("<II", len(chunk), kind) + chunk

@@ -109,6 +109,7 @@ class _Model:
         scenario, layout = self._plan.scenario, self._plan.layout
         if scenario.build_zone is None or not layout:
             return
+        # Base and top of a piece are those of its block, which stands on the ground below it.
         blocks = {block.rectangle_m: block for block in barrier_outline(scenario, layout).blocks}
         items = {item.name: item for item in scenario.build_zone.items}
         for placed in placed_elements(self._plan):

@@ -318,6 +318,8 @@ class CalibrationReport:
         """
         study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
+        # Two kinds of doubt: from distance to distance, by leaving each out, and from seed to seed,
+        # by drawing seeds with replacement.
         left_out = leave_one_out(
             study.distances_m, self.summary.i_sim.to_numpy(), reference, FITS[law]
         )
