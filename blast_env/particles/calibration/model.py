@@ -6,7 +6,7 @@ The module also has the unit for displaying the loads of a blast by particles.
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
 from math import hypot
@@ -150,7 +150,7 @@ class Calibration(CalibrationSection):
         self.scaling_law  # noqa: B018  # rejects invalid coefficients
         return self
 
-    @property
+    @cached_property
     def scaling_law(self) -> ScalingLaw:
         """The law from i_sim on the reference facade to psi*s."""
         return LAWS[self.law](**self.coefficients)
