@@ -3,7 +3,7 @@
 The measures are shares of the lines of sight from charge to protected structures that barriers cut.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import cos, pi, sin
@@ -26,6 +26,7 @@ from blast_env.site import (
     find_scenario,
 )
 from blast_env.site.terraces import is_open_below
+from blast_env.sites.sight_bits import SightBits, Words, take_next
 from blast_env.units import MODULE_SIDE_M
 
 DIRECTIONS: Final = 360
@@ -232,7 +233,7 @@ class SiteMeasures:
 
     Attributes:
         open_share: Share that no other structure stops; the other shares are of these lines.
-        layout_share: Share that `visibility_layout` cuts.
+        layout_share: Share that `visibility_layout` cuts, up to the order of equal elements.
         wall_share: Share that the best straight wall cuts: the whole stock in one run along a row
             or column of the zone, without regard to budget and access way. With a catalogue: as
             many pieces of one item as stock and budget allow.
@@ -258,17 +259,53 @@ class SiteMeasures:
         """
         scenario = find_scenario(scenario)
         lines, placement = Visibility.of(scenario), LayoutState.empty(scenario)
-        cut = _cut_by_variants(lines, placement.catalogue)
+        sight = _Sight.of(lines, placement.catalogue)
         if scenario.zone.items:
-            random_share = _random_pieces_share(placement, lines, cut)
+            random_share = _random_pieces_share(placement, sight)
         else:
             random_share = _random_share(scenario, lines)
         return cls(
             open_share=lines.open_share,
-            layout_share=cut_share_of(lines, _greedy(placement, lines, cut)),
-            wall_share=_wall_share(scenario, lines),
+            layout_share=cut_share_of(lines, _greedy(placement, _CountedGains(placement, sight))),
+            wall_share=_wall_share(scenario, sight),
             random_share=random_share,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """The lines of sight as bits.
+
+    Attributes:
+        lines: The lines.
+        bits: Their order.
+        by_height: Lines that a module of each height would cut (rows, columns, words).
+        by_variants: Lines that each action would cut, of which a piece that reaches beyond the zone
+            counts with its part inside (variants, rows, columns, words).
+    """
+
+    lines: Visibility
+    bits: SightBits
+    by_height: Mapping[float | None, Words]
+    by_variants: Words
+
+    @classmethod
+    def of(cls, lines: Visibility, catalogue: Catalogue) -> "_Sight":
+        """Return the lines of sight on a site with a catalogue."""
+        variants = catalogue.variants
+        heights_m = [*{item.height_m: None for item in variants if not item.is_measure}]
+        bits = SightBits.of(lines.weight)
+        by_height = dict(
+            zip(heights_m, bits.cut_by(lines.cut, lines.height_m, heights_m), strict=True)
+        )
+        shape = len(variants), *catalogue.shape, bits.words
+        by_variants = np.zeros(shape, dtype=np.uint64)
+        for own, variant in zip(by_variants, variants, strict=True):
+            if not variant.is_measure:
+                own[...] = by_height[variant.height_m]
+                take_next(own, 0, variant.rows)
+                take_next(own, 1, variant.columns)
+        return cls(lines, bits, by_height, by_variants)
 
 
 def cut_share_of(lines: Visibility, placement: LayoutState) -> float:
@@ -289,31 +326,82 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
         lines: Its lines of sight.
     """
     placement = LayoutState.empty(scenario)
-    return _greedy(placement, lines, _cut_by_variants(lines, placement.catalogue)).layout
+    return _greedy(placement, _SummedGains(placement, lines)).layout
 
 
-def _greedy(placement: LayoutState, lines: Visibility, cut: BoolArray) -> LayoutState:
-    left = np.ones(len(lines.weight), dtype=bool)
-    possible = placement.legal.reshape(-1)  # what is not legal at first never becomes so
-    cut, gain = cut[:, possible], np.zeros(len(possible))
-    gain[possible] = _gains(lines.weight, cut)
-    column = np.cumsum(possible) - 1
-    nothing = _ROUNDING * float(lines.weight.sum())
+class _Gains(Protocol):
+    """The weight of the lines that each element would cut, among those that are left."""
+
+    nothing: float
+
+    def of_all(self) -> FloatArray:
+        """Return the weights (actions,), 0 of what is not legal at first."""
+
+    def cut(self, action: int) -> None:
+        """Take away the lines that an element cuts."""
+
+
+def _greedy(placement: LayoutState, gains: _Gains) -> LayoutState:
     while not placement.is_full:
+        gain = gains.of_all()
         worth = np.where(placement.legal, gain.reshape(placement.legal.shape), 0.0)
         worth /= placement.costs
         action = int(worth.argmax())
-        if not gain[action] > nothing or not worth.flat[action] > 0.0:
+        if not gain[action] > gains.nothing or not worth.flat[action] > 0.0:
             break
         placement = placement.place(placement.catalogue.element(action))
-        newly = left & cut[:, column[action]]
-        left &= ~newly
-        gain[possible] -= _gains(lines.weight[newly], cut[newly])
+        gains.cut(action)
     return placement
 
 
 _ROUNDING: Final = 1e-9
 """Share of the lines that counts as 0, to absorb rounding of fractional weights."""
+
+
+class _SummedGains:
+    """Gains as sums of the weights, each less what is cut.
+
+    The last bit of a sum decides between elements that cut equally much. Published layouts of the
+    rule depend on that, so `visibility_layout` keeps it.
+    """
+
+    def __init__(self, placement: LayoutState, lines: Visibility) -> None:
+        self._weight, self._left = lines.weight, np.ones(len(lines.weight), dtype=bool)
+        self._possible = placement.legal.reshape(-1)  # what is not legal never becomes so
+        self._cut = _cut_by_variants(lines, placement.catalogue)[:, self._possible]
+        self._column = np.cumsum(self._possible) - 1
+        self._gain = np.zeros(len(self._possible))
+        self._gain[self._possible] = _gains(lines.weight, self._cut)
+        self.nothing = _ROUNDING * float(lines.weight.sum())
+
+    def of_all(self) -> FloatArray:
+        return self._gain
+
+    def cut(self, action: int) -> None:
+        newly = self._left & self._cut[:, self._column[action]]
+        self._left &= ~newly
+        self._gain[self._possible] -= _gains(self._weight[newly], self._cut[newly])
+
+
+class _CountedGains:
+    """Gains as numbers of lines times their weights: of equal ones the first element is best."""
+
+    def __init__(self, placement: LayoutState, sight: "_Sight") -> None:
+        self._bits, self._possible = sight.bits, placement.legal.reshape(-1)
+        self._left = sight.by_variants.reshape(len(self._possible), sight.bits.words)[
+            self._possible
+        ]
+        self._column = np.cumsum(self._possible) - 1
+        self.nothing = _ROUNDING * float(sight.lines.weight.sum())
+
+    def of_all(self) -> FloatArray:
+        gain = np.zeros(len(self._possible))
+        gain[self._possible] = self._bits.weight_of(self._left)
+        return gain
+
+    def cut(self, action: int) -> None:
+        self._left &= ~self._left[self._column[action]]
+
 
 _NUMBERS_AT_ONCE: Final = 1_000_000
 """Truth values converted to numbers at a time, eight bytes each."""
@@ -346,32 +434,24 @@ def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
         own = cut[:, number]
         own[...] = by_height[variant.height_m]
         for cells, length in ((own.transpose(1, 0, 2), variant.rows), (own.T, variant.columns)):
-            _take_next(cells, length)
+            take_next(cells, 0, length)
     return cut.reshape(len(lines.weight), catalogue.finish)
 
 
-def _take_next(cells: BoolArray, length: int) -> None:
-    """Set each cell to whether any of `length` cells from it along the first axis is true."""
-    taken = 1
-    while taken < length:
-        step = min(taken, length - taken)
-        cells[:-step] |= cells[step:]
-        taken += step
-
-
-def _wall_share(scenario: Scenario, lines: Visibility) -> float:
+def _wall_share(scenario: Scenario, sight: _Sight) -> float:
     """Return the share of the lines that the best straight run of modules cuts."""
-    if not len(lines.weight):
+    weight = sight.lines.weight
+    if not len(weight):
         return 0.0
     usable = usable_cells(scenario)
     best = 0.0
     for height_m, longest in _longest_runs(scenario.zone):
-        cut = lines.cut_by(height_m) & usable
-        for along_rows in (cut, cut.transpose(0, 2, 1)):
-            run = min(longest, along_rows.shape[1])
-            cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
-            best = max(best, float(_gains(lines.weight, cut_by_run).max(initial=0.0)))
-    return min(float(best / lines.weight.sum()), 1.0)
+        cut = np.where(usable[..., np.newaxis], sight.by_height[height_m], np.uint64(0))
+        for axis, cells in enumerate(usable.shape):
+            by_run = cut.copy()
+            take_next(by_run, axis, min(longest, cells))
+            best = max(best, float(sight.bits.weight_of(by_run).max(initial=0.0)))
+    return min(float(best / weight.sum()), 1.0)
 
 
 def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:
@@ -387,13 +467,6 @@ def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:
             pieces = min(pieces, int(zone.budget / item.cost))
         if pieces:
             yield item.height_m, pieces * item.length_modules
-
-
-def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
-    """Return whether any cell of each run along the second axis is true, (lines, runs, others)."""
-    anything = cut.copy()
-    _take_next(anything.transpose(1, 0, 2), run)
-    return anything[:, : cut.shape[1] - run + 1]
 
 
 def _random_share(scenario: Scenario, lines: Visibility) -> float:
@@ -413,21 +486,21 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     return round(share, 9)  # the last bit differs between machines and must not decide
 
 
-def _random_pieces_share(placement: LayoutState, lines: Visibility, cut: BoolArray) -> float:
+def _random_pieces_share(placement: LayoutState, sight: _Sight) -> float:
     """Return the approximate share of the lines that random pieces cut; overlaps are allowed."""
-    zone = placement.scenario.zone
-    legal = placement.legal.reshape(len(placement.legal), -1)
-    cut = cut.reshape(len(lines.weight), *legal.shape)
+    zone, weight = placement.scenario.zone, sight.lines.weight
+    legal = placement.legal
     numbers = np.array([variant.item for variant in placement.catalogue.variants])
     there = [number for number in range(len(zone.items)) if legal[numbers == number].any()]
     mean_cost = float(np.mean([zone.items[number].cost for number in there]))
     pieces = zone.stock if zone.budget is None else min(zone.stock, zone.budget / mean_cost)
-    missed: FloatArray = np.ones(len(lines.weight))
+    missed: FloatArray = np.ones(len(weight))
     for number in there:
-        places = legal[numbers == number]
-        cutting = (cut[:, numbers == number] & places).sum(axis=(1, 2)) / places.sum()
+        own = numbers == number
+        places = sight.by_variants[own][legal[own]]
+        cutting = sight.bits.counts(places) / len(places)
         missed *= (1.0 - cutting) ** min(zone.items[number].stock, pieces / len(there))
-    share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
+    share = 1.0 - float(weight @ missed) / max(float(weight.sum()), 1e-300)
     return round(share, 9)  # as `_random_share`
 
 
