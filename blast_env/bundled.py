@@ -23,6 +23,9 @@ STREET_SITES: Final = "street_sites"
 COURT_SITES: Final = "court_sites"
 """Name of courts between several buildings, of any size."""
 
+HEADROOM_SITES: Final = "headroom_sites"
+"""Name of those of the sites on which layouts are ahead of all rules."""
+
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
 """Those of an environment: all sites of a name have one size."""
 

@@ -16,7 +16,12 @@ if TYPE_CHECKING:
         cut_share_of,
         visibility_layout,
     )
-    from blast_env.sites.generate import draw_site, generate_site
+    from blast_env.sites.generate import HELD_OUT_SITES, draw_site, generate_site
+    from blast_env.sites.headroom_sites import (
+        HEADROOM_HELD_OUT,
+        HEADROOM_TRAINING,
+        headroom_site,
+    )
     from blast_env.sites.item_sites import (
         CLOSE_SIDES_M,
         ITEM_KINDS,
@@ -35,7 +40,6 @@ if TYPE_CHECKING:
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
     from blast_env.sites.source import (
         FAMILIES,
-        HELD_OUT_SITES,
         SITE_KINDS,
         SiteSource,
         training_sites,
@@ -47,6 +51,8 @@ else:
 __all__ = [
     "CLOSE_SIDES_M",
     "FAMILIES",
+    "HEADROOM_HELD_OUT",
+    "HEADROOM_TRAINING",
     "HELD_OUT_SITES",
     "ITEM_KINDS",
     "ITEM_SITES",
@@ -73,6 +79,7 @@ __all__ = [
     "draw_place",
     "draw_site",
     "generate_site",
+    "headroom_site",
     "kerb_site",
     "large_ranges",
     "street_site",

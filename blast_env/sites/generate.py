@@ -21,6 +21,9 @@ MOST_TRIES: Final = 200
 
 MOST_SEED: Final = 2**63 - 1
 
+HELD_OUT_SITES: Final = 10_000
+"""Number of held-out seeds, 0 to 9,999; training uses the seeds from 10,000."""
+
 _SIDES: Final = ("left", "lower", "right", "upper")
 
 

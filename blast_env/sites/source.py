@@ -10,6 +10,7 @@ import numpy as np
 
 from blast_env.bundled import (
     COURT_SITES,
+    HEADROOM_SITES,
     ITEM_SITES,
     KERB_SITES,
     LARGE_SITES,
@@ -19,7 +20,8 @@ from blast_env.bundled import (
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
-from blast_env.sites.generate import MOST_SEED, RANGES, generate_site
+from blast_env.sites.generate import HELD_OUT_SITES, MOST_SEED, RANGES, generate_site
+from blast_env.sites.headroom_sites import headroom_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
 from blast_env.sites.kerb_sites import court_site, kerb_site, street_site
 from blast_env.sites.ranges import Ranges
@@ -35,12 +37,10 @@ SITE_KINDS: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
         KERB_SITES: kerb_site,
         STREET_SITES: street_site,
         COURT_SITES: court_site,
+        HEADROOM_SITES: headroom_site,
     }
 )
 """What makes a site from its seed, by the name of its kind: the families, and kinds of any size."""
-
-HELD_OUT_SITES: Final = 10_000
-"""Number of held-out seeds, 0 to 9,999; training uses the seeds from 10,000."""
 
 TRAINING_SITES: Final = 2**31
 """Default number of training seeds, practically unlimited."""

@@ -8,6 +8,7 @@ Without one they propose the draw with the best guess.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
 from blast_env.arrays import FloatArray
-from blast_env.benchmark import BenchmarkProblem
+from blast_env.benchmark import BenchmarkProblem, Definition, make
 from blast_env.benchmark.methods import method_of
 from blast_env.design.search.by_rule import rule_layouts
 from blast_env.design.search.learnt import Guesses, improved, packaged_search
@@ -120,10 +121,7 @@ def surrogate_alone(problem: BenchmarkProblem, seed: int) -> Layout:
 
 def ppo(problem: BenchmarkProblem, seed: int) -> Layout:
     """PPO of Stable-Baselines3; its action is a row across the line of sight."""
-    env = _environment(problem, "row")
-    model = PPO("MlpPolicy", env, seed=seed, **_SETTINGS).learn(_STEPS)
-    draws = _draws(env, lambda seen, steady: model.predict(seen, None, None, steady), _DRAWS)
-    return _best_of(problem, _ranked(draws))
+    return _best_of(problem, _of_ppo(problem.definition, seed))
 
 
 def maskable_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
@@ -134,8 +132,7 @@ def maskable_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
 
 def imitation(problem: BenchmarkProblem, seed: int) -> Layout:
     """A policy that learns to place the best layouts of a search by guesses, piece by piece."""
-    env, model = _imitating(problem, seed)
-    return _of_masked(problem, env, model, 0)
+    return _best_of(problem, _of_imitation(problem.definition, seed))
 
 
 def imitation_unranked(problem: BenchmarkProblem, seed: int) -> Layout:
@@ -154,6 +151,22 @@ def untrained(problem: BenchmarkProblem, seed: int) -> Layout:
     """Ranked draws of an untrained policy: imitation without its demonstrations."""
     env = _environment(problem, "place")
     return _of_masked(problem, env, MaskablePPO("MlpPolicy", env, seed=seed, **_SETTINGS), 0)
+
+
+@lru_cache(maxsize=128)
+def _of_ppo(definition: Definition, seed: int) -> tuple["Guessed", ...]:
+    """Return the ranked draws of PPO: one training, whatever the budget."""
+    env = _environment(make(definition, 0), "row")
+    model = PPO("MlpPolicy", env, seed=seed, **_SETTINGS).learn(_STEPS)
+    draws = _draws(env, lambda seen, steady: model.predict(seen, None, None, steady), _DRAWS)
+    return tuple(_ranked(draws))
+
+
+@lru_cache(maxsize=128)
+def _of_imitation(definition: Definition, seed: int) -> tuple["Guessed", ...]:
+    """Return the ranked draws of imitation: one training, whatever the budget."""
+    env, model = _imitating(make(definition, 0), seed)
+    return tuple(_ranked(_draws(env, _masked(env, model), _DRAWS)))
 
 
 def _imitating(problem: BenchmarkProblem, seed: int) -> tuple[BlastBarrierEnv, MaskablePPO]:

@@ -161,7 +161,20 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.headroom --kind item_sites --kind kerb_sites --sites 10 --blasts 30": (
         "--sites 2 --blasts 2"
     ),
+    "python -m studies.headroom_sites --first 0 --sites 50": "--sites 1 --changes 4",
+    "python -m studies.headroom_sites --kind kerb_sites --first 0 --sites 40": (
+        "--sites 1 --changes 4"
+    ),
+    "python -m studies.headroom_sites --kind kerb_sites --first 10000 --sites 40": (
+        "--sites 1 --changes 4"
+    ),
+    "python -m studies.headroom --kind headroom_sites --first 0 --sites 8 --blasts 20": (
+        "--sites 2 --blasts 2"
+    ),
     # docs/researchers/training.md
+    "python -m studies.packaged_agent judge --kind headroom_sites --first 0 --sites 14": (
+        "--sites 2"
+    ),
     "python -m studies.packaged_agent show --out out/packaged/shown.jsonl": (
         "--rounds 1 --changes 5"
     ),
