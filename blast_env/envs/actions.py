@@ -132,7 +132,7 @@ class Actions(Protocol):
         """Return how agents write the actions, of which there are `count`."""
 
 
-class _Numbered:
+class _AsNumbers:
     """Actions that agents write as numbers."""
 
     def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
@@ -141,7 +141,7 @@ class _Numbered:
 
 
 @dataclass(frozen=True)
-class PlaceAtOnce(_Numbered):
+class PlaceAtOnce(_AsNumbers):
     """One action per placement: a variant and its lower left cell, as `Catalogue` numbers them."""
 
     def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
@@ -164,7 +164,7 @@ class PlaceByDimensions(PlaceAtOnce):
 
 
 @dataclass(frozen=True)
-class ItemThenPlace(_Numbered):
+class ItemThenPlace(_AsNumbers):
     """First the variant (an item in one orientation), then the place of its lower left cell.
 
     In a zone without a catalogue only the place is chosen.
@@ -197,7 +197,7 @@ class ItemThenPlace(_Numbered):
 
 
 @dataclass(frozen=True)
-class RowAcrossSight(_Numbered):
+class RowAcrossSight(_AsNumbers):
     """The variant and a row of cells across the line of sight, without the place in it.
 
     A row is a column or a row of the build zone: whichever lies more across the line from the mean

@@ -260,7 +260,7 @@ def _largest(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
 
 
 @dataclass(frozen=True)
-class _Walled:
+class _BuildingWalls:
     """A structure, or the parts of a building, as a single box with walls.
 
     Attributes:
@@ -278,7 +278,9 @@ class _Walled:
     faces: frozenset[WallName]
 
     @classmethod
-    def of(cls, name: str, parts: Sequence[StructureOutline], air_height_m: float) -> "_Walled":
+    def of(
+        cls, name: str, parts: Sequence[StructureOutline], air_height_m: float
+    ) -> "_BuildingWalls":
         """Combine structures into one."""
         return cls(
             name,
@@ -289,7 +291,7 @@ class _Walled:
         )
 
 
-def _walled(result: GasResult, name: str | None) -> _Walled:
+def _walled(result: GasResult, name: str | None) -> _BuildingWalls:
     """Return the structure or building with a name, or by default the worst building."""
     site, scenario = result.run.site, result.blast.scenario
     known = {
@@ -309,10 +311,10 @@ def _walled(result: GasResult, name: str | None) -> _Walled:
     found = {**known, **buildings}  # a building may have the name of a part
     if name not in found:
         raise UnknownNameError("structure", name, found)
-    return _Walled.of(name, found[name], site.air_height_m)
+    return _BuildingWalls.of(name, found[name], site.air_height_m)
 
 
-def _wall(result: GasResult, walled: _Walled, wall: WallName, kind: Kind) -> FloatArray:
+def _wall(result: GasResult, walled: _BuildingWalls, wall: WallName, kind: Kind) -> FloatArray:
     """Return the load on each cell's face of a wall, by height and along x or y.
 
     It is NaN where an obstacle touches the wall.
@@ -331,14 +333,14 @@ def _wall(result: GasResult, walled: _Walled, wall: WallName, kind: Kind) -> Flo
     return values
 
 
-def _length_m(walled: _Walled, wall: WallName) -> float:
+def _length_m(walled: _BuildingWalls, wall: WallName) -> float:
     left, bottom, right, top = walled.rectangle_m
     return right - left if _LEFT_TO_RIGHT[wall][0] == "x" else top - bottom
 
 
 def _draw_wall(
     axes: Axes,
-    outline: _Walled,
+    outline: _BuildingWalls,
     wall: WallName,
     values: FloatArray,
     scale: Normalize,
@@ -367,7 +369,7 @@ def _figures(load: Any) -> str:
 
 
 def _wall_title(
-    outline: _Walled,
+    outline: _BuildingWalls,
     wall: WallName,
     values: FloatArray,
     before: FloatArray | None,

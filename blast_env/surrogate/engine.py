@@ -39,7 +39,7 @@ def _zero_loads(site: SurrogateSite) -> tuple[StructureLoad, ...]:
     )
 
 
-class _Served:
+class _SiteLoads:
     """A site, with what the loads of all its predictions have in common."""
 
     def __init__(self, site: SurrogateSite) -> None:
@@ -95,7 +95,7 @@ class SurrogateEngine(Engine):
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
-    _sites: OrderedDict[str, _Served] = field(
+    _sites: OrderedDict[str, _SiteLoads] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
     )
     _memory: Memory = field(default_factory=Memory, init=False, repr=False, compare=False)
@@ -156,10 +156,10 @@ class SurrogateEngine(Engine):
                 found[number] = loads
         return [blast_loads for blast_loads in found if blast_loads is not None]
 
-    def _site(self, scenario: Scenario) -> _Served:
+    def _site(self, scenario: Scenario) -> _SiteLoads:
         key = scenario.content_hash
         if key not in self._sites:
-            self._sites[key] = _Served(site_of(scenario, self._memory))
+            self._sites[key] = _SiteLoads(site_of(scenario, self._memory))
             if len(self._sites) > _KEPT_SITES:
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)
