@@ -56,7 +56,7 @@ def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
         message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
         yield Problem("build_zone.stock", message)
     # What is left to build narrows down: in stock, then without closing the way, then within the
-    # budget; only the first want is a problem.
+    # budget.
     in_stock = [cells.catalogue.stocks[variant.item] > 0 for variant in cells.catalogue.variants]
     available = cells.fits & np.array(in_stock)[:, np.newaxis, np.newaxis]
     if zone.access_way is not None:
