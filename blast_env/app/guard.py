@@ -220,7 +220,7 @@ class Guard:
         if len(hosts) != 1 or hosts[0].lower() not in self._authorities:
             return (
                 f"host {', '.join(hosts)!r} is none that this page was started for; another name"
-                " is allowed with --allow-host"
+                " is allowed with `blast-env app --allow-host`"
             )
         origins = asked.headers.getlist("origin")
         is_websocket = asked.scope["type"] == "websocket"

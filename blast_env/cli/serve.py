@@ -34,7 +34,7 @@ def serve(
         None, help="Problem of the benchmark, instead of a split and an index."
     ),
     split: str = typer.Option("benchmark", help=f"Kind of problems: {', '.join(SPLITS)}."),
-    index: int = typer.Option(0, help="Number of the problem.", min=0),
+    index: int = typer.Option(0, help="Number of the problem; of the first with --resets.", min=0),
     seed: int = typer.Option(0, help="Seed of what is drawn.", min=0, max=MOST_SEED),
     budget: int = typer.Option(BUDGET, help="Most blasts of a session.", min=0, max=BUDGETS[-1]),
     secret: str = typer.Option(
@@ -56,7 +56,7 @@ def serve(
     if problem is not None:
         split, index = "benchmark", list(DEFINITIONS).index(find_definition(problem).name)
     if resets is not None:
-        print_line(json.dumps(tasks.resets(split, resets, budget), indent=2))
+        print_line(json.dumps(tasks.resets(split, resets, budget, index), indent=2))
         return
     if mcp == openenv:
         raise BlastEnvError("choose one door: --mcp or --openenv")

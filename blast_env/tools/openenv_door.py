@@ -1,5 +1,6 @@
 """The door by OpenEnv: an episode of the tools as an environment, by HTTP and websockets."""
 
+from os import environ
 from typing import Any
 
 from pydantic import Field
@@ -36,7 +37,9 @@ class ToolEnvironment(TaskLists, Environment[ToolCall, ToolAnswer, State]):
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self, tasks: Tasks | None = None) -> None:
+        """Take the problems; unless given, those of the secret in `BLAST_ENV_SECRET`."""
+        tasks = Tasks(environ.get("BLAST_ENV_SECRET", "")) if tasks is None else tasks
         TaskLists.__init__(self, tasks)
         Environment.__init__(self)
         self._episodes = Episodes(tasks)

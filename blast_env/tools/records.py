@@ -84,7 +84,7 @@ class Answer(Record):
     """What every tool returns beside its own results."""
 
     blasts_left: Annotated[int, Field(description="Blasts that remain in the budget.")]
-    seconds: Annotated[float, Field(description="Seconds that tools have taken so far.")]
+    seconds: Annotated[float, Field(description="Seconds since the session began.")]
     validity: Annotated[str, Field(description="What the numbers are good for.")]
 
 
@@ -140,8 +140,8 @@ class Look(Answer):
     score_1: Annotated[str, Field(description="What scores 1.")]
     seed: int
     blasts_each: Annotated[int, Field(description="Blasts that one call of `blast` costs.")]
-    width_m: float
-    height_m: float
+    width_m: Annotated[float, Field(description="Extent of the site in x, from west to east.")]
+    height_m: Annotated[float, Field(description="Extent in y, from south to north.")]
     threats: tuple[Threat, ...]
     buildings: tuple[Building, ...]
     zone_west_m: Annotated[float, Field(description="x of the lower left corner of cell (0, 0).")]

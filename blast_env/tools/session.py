@@ -45,7 +45,7 @@ from blast_env.tools.records import (
     Proposals,
     Score,
 )
-from blast_env.tools.sight import legality_of, look_at, proposals_for
+from blast_env.tools.sight import element_in, legality_of, look_at, proposals_for
 from blast_env.values import MOST_SEED, generator, whole_number
 
 WAIT_S: Final = 25.0
@@ -80,7 +80,8 @@ class Session:
         reference: The best known layout; the stored one or, without one, the best of the rules and
             the package's proposal unless given.
         cache: Folder or store in which blasts are kept for other sessions.
-        wait_s: Longest time for which a tool waits before it gives a ticket, s.
+        wait_s: Longest time for which a tool waits before it gives a ticket, s; `None` for as long
+            as it takes.
 
     Raises:
         UnknownNameError: If there is no such problem.
@@ -97,7 +98,7 @@ class Session:
         judge_cell_m: float | None = JUDGE_CELL_M,
         reference: ScoreReference | None = None,
         cache: str | Path | BlastStore | None = None,
-        wait_s: float = WAIT_S,
+        wait_s: float | None = WAIT_S,
     ) -> None:
         self.seed = whole_number("seed", seed, 0, MOST_SEED)
         self._problem = make(problem, budget, engine=engine, cache=cache)
@@ -254,7 +255,7 @@ class Session:
     def _checked(self, layout: Sequence[PlacedPiece]) -> Layout:
         """Return a legal layout, sorted."""
         try:
-            elements = [piece.element for piece in layout]
+            elements = [element_in(self._problem, piece) for piece in layout]
             return tuple(sorted(check_layout(self._problem.scenario, elements)))
         except BlastEnvError as error:
             raise BlastEnvError(

@@ -8,6 +8,7 @@ from blast_env.benchmark import BenchmarkProblem
 from blast_env.design import random_layout
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, VehicleCharge
 from blast_env.tools.records import (
@@ -89,18 +90,29 @@ def proposals_for(problem: BenchmarkProblem, seed: int) -> tuple[Proposal, ...]:
 
 
 def legality_of(problem: BenchmarkProblem, layout: Sequence[PlacedPiece]) -> dict[str, Any]:
-    """Return whether a layout is legal, the reasons against it, and the cost of what is legal.
-
-    Raises:
-        LayoutError: If a piece has another form.
-    """
+    """Return whether a layout is legal, the reasons against it, and the cost of what is legal."""
     placement, reasons = LayoutState.empty(problem.scenario), []
     for piece in layout:
         try:
-            placement = placement.place(piece.element)
+            placement = placement.place(element_in(problem, piece))
         except BlastEnvError as error:
             reasons.append(str(error))
     return {"legal": not reasons, "reasons": tuple(reasons), "cost": placement.cost}
+
+
+def element_in(problem: BenchmarkProblem, piece: PlacedPiece) -> Element:
+    """Return the element of a piece, which need not be legal.
+
+    Raises:
+        BlastEnvError: If it names no item where there are items.
+    """
+    names = [item.item for item in _items(problem.scenario)]
+    if names and not piece.item:
+        raise BlastEnvError(
+            f"the piece at row {piece.row}, column {piece.column} has no `item`, which must be one "
+            f"of {', '.join(names)}"
+        )
+    return piece.element
 
 
 def _threats(problem: BenchmarkProblem) -> Iterator[Threat]:

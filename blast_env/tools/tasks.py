@@ -93,14 +93,22 @@ class Tasks:
         definition = self.problem(episode.split, index)
         return self.session(definition, episode.seed, episode.budget)
 
-    def resets(self, split: str, count: int, budget: int = BUDGET) -> list[dict[str, Any]]:
-        """Return the arguments of the first resets of a split, for trainers that want a list.
+    def resets(
+        self, split: str, count: int, budget: int = BUDGET, first: int = 0
+    ) -> list[dict[str, Any]]:
+        """Return the arguments of resets of a split, for trainers that want a list.
+
+        Args:
+            split: The split.
+            count: Number of resets.
+            budget: Most blasts of each.
+            first: Index of the first; the others follow.
 
         Raises:
             BlastEnvError: As `problem`, or if the split has fewer problems.
         """
-        self.problem(split, count - 1)
+        self.problem(split, first + count - 1)
         return [
             {"split": split, "index": index, "seed": index, "budget": budget}
-            for index in range(count)
+            for index in range(first, first + count)
         ]

@@ -46,7 +46,7 @@ class HeldEngine(RowEngine):
 
 
 def session(seed: int = 0, budget: int = 3, **changes: Any) -> Session:
-    given = {"engine": RowEngine(), "judge_cell_m": None, "reference": REFERENCE, "wait_s": 300.0}
+    given = {"engine": RowEngine(), "judge_cell_m": None, "reference": REFERENCE, "wait_s": None}
     return Session(NAME, seed, budget, **(given | changes))
 
 

@@ -70,6 +70,13 @@ def test_full_zero_malformed_and_reseeded(environment: ToolEnvironment) -> None:
         assert refused.error
 
 
+def test_an_environment_is_made_of_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As trainers make it that are given the name of its class alone, such as NeMo Gym."""
+    assert ToolEnvironment().list_splits() == ["train", "benchmark"]
+    monkeypatch.setenv("BLAST_ENV_SECRET", SECRET)
+    assert ToolEnvironment().list_splits() == ["train", "test", "benchmark"]
+
+
 def test_a_step_before_a_reset_ends_at_once(environment: ToolEnvironment) -> None:
     for _ in range(2):
         found = call(environment, "look")

@@ -241,6 +241,7 @@ def test_malformed_arguments_are_refused_in_words() -> None:
         ("blast", {}, "layout is missing; its arguments: layout"),
         ("blast", {"layout": [{"row": -1, "column": 0}]}, r"layout\[0\].row is -1"),
         ("blast", {"layout": [{"row": 1, "column": 0, "item": "wal"}]}, "`check` has all reasons"),
+        ("blast", {"layout": [{"row": 1, "column": 0}]}, "row 1, column 0 has no `item`.*low_wall"),
         ("poll", {"ticket": "lottery"}, "there is no ticket 'lottery': `blast` and `submit` give"),
     ],
 )
@@ -254,6 +255,10 @@ def test_check_has_a_reason_for_each_piece(own: Session) -> None:
     found = call_tool(own, "check", {"layout": walls(BEST[0], *wrong)}).model_dump()
     assert not found["legal"]
     assert len(found["reasons"]) == 2
+    unnamed = call_tool(own, "check", {"layout": [{"row": 1, "column": 0}]}).model_dump()
+    assert unnamed["reasons"] == (
+        "the piece at row 1, column 0 has no `item`, which must be one of high_wall, low_wall",
+    )
     assert found["cost"] == call_tool(own, "check", {"layout": WALL}).model_dump()["cost"] == 9.0
 
 

@@ -38,6 +38,13 @@ def test_splits_have_ends() -> None:
         Tasks("short")
 
 
+def test_resets_go_on_from_the_first() -> None:
+    tasks = Tasks()
+    assert tasks.resets("benchmark", 3)[2:] == tasks.resets("benchmark", 1, first=2)
+    with pytest.raises(BlastEnvError, match="index is 12"):
+        tasks.resets("benchmark", 2, first=len(DEFINITIONS) - 1)
+
+
 def test_lists_tell_no_site() -> None:
     lists = TaskLists(Tasks(SECRET))
     assert lists.list_splits() == ["train", "test", "benchmark"]

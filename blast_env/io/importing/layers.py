@@ -1,6 +1,8 @@
 """Reading of layers of GeoPackage, shapefile, FlatGeobuf and KML by pyogrio, which has GDAL."""
 
+import glob
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -29,6 +31,9 @@ _TAG_NAMES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Tags by other names: a shapefile cuts names after ten letters, KML has a capital."""
 
+_COMPANIONS: Final = (".dbf", ".shx")
+"""Files that a shapefile cannot do without; its `.prj` is missed where it is needed."""
+
 _LAYER: Final = "Layer"
 """Tag with the name of the layer in a file of several; OpenStreetMap's `layer` is a height."""
 
@@ -45,6 +50,7 @@ def read_layers(site_map: SiteMap) -> None:
     """
     site_map.options.refuse("geographic data, whose coordinates --crs is about", "units")
     path, systems = site_map.path, dict[str, str | None]()
+    _check_companions(path)
     with import_extra("gis", "geographic data"):
         import pyogrio
     with errors_of("pyogrio", path, "geographic data"):
@@ -54,13 +60,27 @@ def read_layers(site_map: SiteMap) -> None:
             count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
             check_count(path, count, MOST_FEATURES, "outlines and lines")
             meta, _, geometries, columns = pyogrio.raw.read(path, layer=name, force_2d=True)
-        if geometries is None:
-            continue  # a table without places
+        if geometries is None or not len(geometries):
+            continue  # a table without places, or an empty layer
         systems[name] = meta["crs"]
         for feature in _features(name if len(names) > 1 else "", meta, geometries, columns):
             site_map.add(feature)
-    crs = _system(site_map, systems) if site_map.options.crs is None else site_map.options.crs
-    site_map.crs = None if crs == LOCAL else crs
+    if site_map.features:
+        crs = _system(site_map, systems)
+        site_map.crs = None if crs == LOCAL else crs
+
+
+def _check_companions(path: Path) -> None:
+    """Refuse a shapefile that came alone: GDAL reads one without its table, and says nothing."""
+    if path.suffix.lower() != ".shp":
+        return
+    beside = {each.suffix.lower() for each in path.parent.glob(f"{glob.escape(path.stem)}.*")}
+    missing = [suffix for suffix in _COMPANIONS if suffix not in beside]
+    if missing:
+        raise BlastEnvError(
+            f"{path}: a shapefile is several files, of which {' and '.join(missing)} must lie "
+            "beside it: .dbf has the names and heights, .shx where each outline begins"
+        )
 
 
 def _features(
@@ -94,14 +114,16 @@ def _plain(value: Any) -> str | int | float | bool | None:
 
 
 def _system(site_map: SiteMap, systems: Mapping[str, str | None]) -> str:
-    """Return the reference system of all layers."""
+    """Return the reference system of the options, or that of all layers."""
     known = {system for system in systems.values() if system is not None}
     if len(known) > 1:
         listed = ", ".join(f"{name}: {(system or 'none')[:60]}" for name, system in systems.items())
         raise BlastEnvError(
             f"{site_map.path}: its layers have {len(known)} reference systems, must have one: "
-            f"{listed}"
+            f"{listed}; convert it: ogr2ogr -t_srs EPSG:25832 one.gpkg FILE, or another system"
         )
+    if site_map.options.crs is not None:
+        return site_map.options.crs
     if not known or None in systems.values():
         beside = "; that of a shapefile is in the .prj beside it"
         raise BlastEnvError(

@@ -165,6 +165,8 @@ def _faults(faulty: Iterable[Thing], site: SitePlacement) -> Iterator[Thing]:
 
 def _nothing(site_map: SiteMap, faulty: Sequence[Thing]) -> BlastEnvError:
     """Return the error of a map without a building."""
+    if not site_map.features:
+        return BlastEnvError(f"{site_map.path}: is empty: it has no outline, line or point")
     chosen = site_map.options.buildings_from
     faults = Counter(thing.fault for thing in faulty if thing.role is Role.BUILDING)
     reasons = "; ".join(f"{count} {fault}" for fault, count in faults.most_common(_MOST_LISTED))

@@ -149,7 +149,7 @@ def test_units_of_a_drawing_are_needed(tmp_path: Path) -> None:
 
 
 def test_map_without_buildings(tmp_path: Path) -> None:
-    assert "has no building" in error_of(written(tmp_path))
+    assert "is empty: it has no outline" in error_of(written(tmp_path))
     assert "has no building" in error_of(written(tmp_path, PLACE))
     path, document = drawing(tmp_path)
     document.modelspace().add_lwpolyline(

@@ -56,7 +56,7 @@ def write(
         names,
         layer=layer,
         driver="KML" if path.suffix == ".kml" else None,
-        geometry_type=chosen[0]["geometry"]["type"],
+        geometry_type=chosen[0]["geometry"]["type"] if chosen else "Polygon",
         crs=crs,
         append=append,
     )
@@ -162,7 +162,28 @@ def test_layers_of_two_reference_systems_are_refused(tmp_path: Path) -> None:
     outlines = [feature for feature in features() if is_outline(feature)]
     path = write(tmp_path / "two.gpkg", outlines, "here")
     write(path, outlines, "there", crs="EPSG:25832", append=True)
-    with pytest.raises(BlastEnvError, match="2 reference systems, must have one: here: EPSG:4326"):
+    for options in (OPTIONS, replace(OPTIONS, crs="EPSG:25832")):
+        with pytest.raises(BlastEnvError, match=r"2 reference systems.* here: EPSG:4326.*-t_srs"):
+            import_site(path, options)
+
+
+def test_an_empty_layer_has_no_say_and_an_empty_file_says_so(tmp_path: Path) -> None:
+    outlines = [feature for feature in features() if is_outline(feature)]
+    path = write(tmp_path / "empty.gpkg", [], "nothing", crs="EPSG:25832")
+    with pytest.raises(BlastEnvError, match="is empty: it has no outline, line or point"):
+        import_site(path, OPTIONS)
+    write(path, outlines, "here", append=True)
+    with pytest.raises(BlastEnvError, match="no place for a charge"):  # its buildings are read
+        import_site(path, OPTIONS)
+
+
+@pytest.mark.parametrize("suffix", [".dbf", ".shx"])
+def test_a_shapefile_that_came_alone_is_refused(suffix: str, tmp_path: Path) -> None:
+    """Without its table all heights would be guesses, as of a map that has none."""
+    path = tmp_path / "town [1].shp"
+    for each in {".shp", ".SHX", ".dbf", ".shx"} - {suffix, suffix.upper()}:
+        path.with_suffix(each).touch()
+    with pytest.raises(BlastEnvError, match=f"several files, of which {suffix} must lie beside it"):
         import_site(path, OPTIONS)
 
 
@@ -177,5 +198,7 @@ def test_parquet_without_geometries_says_so(tmp_path: Path) -> None:
 def test_what_is_no_such_file_is_a_plain_error(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"broken{suffix}"
     path.write_bytes(b"this is no map")
+    for beside in (".dbf", ".shx"):
+        path.with_suffix(beside).touch()
     with pytest.raises(BlastEnvError, match="cannot be read as"):
         import_site(path)
