@@ -493,12 +493,14 @@ class Episodes:
         It is the number of the element to place, `_FINISHES`, `_CHOOSES` or `_ILLEGAL`.
         """
         actions = self.running[chosen[0]].shown.actions
-        found: IntArray = np.full(len(chosen), _ILLEGAL)
+        found: IntArray
         if actions.are_plain:  # the usual case, without the time to make a choice
             cells = np.minimum(wanted, actions.finish - 1)
             is_legal = self.layouts.legal.reshape(len(self.running), -1)[chosen, cells]
-            found = np.where(is_legal, wanted, found)
+            found = np.where(is_legal, wanted, _ILLEGAL)
             found[wanted == actions.finish] = _FINISHES
+        else:
+            found = np.full(len(chosen), _ILLEGAL)
         for position in np.flatnonzero(found == _ILLEGAL).tolist():
             found[position] = self._made(int(chosen[position]), int(wanted[position]))
         return found
@@ -577,6 +579,8 @@ class Episodes:
         if len(without_effect):
             self.terms[without_effect, -1] = -self.task.illegal.cost
         rewards: FloatArray = np.zeros(len(chosen))
+        if not len(paid) and not len(without_effect):  # the usual case of one episode
+            return rewards
         for of_term in self.terms[chosen].T:  # one by one: the same sum of one row or of many
             rewards += of_term
         return rewards

@@ -168,14 +168,12 @@ class FeaturesEpisode(BatchObservation):
 
         shares, has_items = stock_shares(placements), placements.rules[0].catalogue.has_items
         if has_items:
-            shares = np.hstack((shares, items_left(placements)))
-        numbers = {id(episode): number for number, episode in enumerate(episodes)}
-        distinct = {number: position for position, number in enumerate(numbers.values())}
-        own = np.array([distinct[numbers[id(episode)]] for episode in episodes])
-        constants, variants = (
-            np.array([getattr(episodes[number], name) for number in distinct])
-            for name in ("constants", "variants")
-        )
+            shares = np.concatenate((shares, items_left(placements)), axis=1)
+        distinct = {id(episode): episode for episode in episodes}
+        position = {key: number for number, key in enumerate(distinct)}
+        own = np.array([position[id(episode)] for episode in episodes])
+        constants = np.array([episode.constants for episode in distinct.values()])
+        variants = np.array([episode.variants for episode in distinct.values()])
         _, kinds, rows, columns = placements.legal.shape
         legal = placements.legal.view(np.uint8).reshape(-1, kinds, rows * columns)
         occupancy = placements.occupancy.reshape(-1, rows * columns)

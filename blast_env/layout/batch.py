@@ -158,8 +158,9 @@ class LayoutBatch:
         place(indices, numbers, self.rules[indices[0]].variants, *arrays)
         # Budgets and access ways are those of a site: layouts on one site at once.
         sites = self._sites[indices]
-        for site in dict.fromkeys(sites.tolist()):
-            own = indices[sites == site]
+        distinct = dict.fromkeys(sites.tolist())
+        for site in distinct:
+            own = indices if len(distinct) == 1 else indices[sites == site]
             self._limit_to_budget(own)
             self._keep_open(own)
         find_full(indices, self.legal, self.is_full)

@@ -26,6 +26,9 @@ SURROGATE: Final = "surrogate"
 
 _NOTES: Final = ("a prediction of the surrogate, not a blast",)
 _GUESSED: Final = Validation(ValidationStatus.APPROXIMATE, "a guess of gas dynamics")
+_SITES_AT_ONCE: Final = 16
+"""Number of sites that pass through the networks together; each takes a megabyte or two."""
+
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
@@ -137,24 +140,35 @@ class SurrogateEngine(Engine):
         return ("These are predictions of a surrogate, not blasts: judge with engine 'gas'.",)
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
-        """Return the same for several blasts, by one pass of the networks per site."""
+        """Return the same for several blasts, by one pass of the networks."""
         found: list[BlastLoads | None] = [None] * len(blasts)
         # Layouts of one site pass through the networks together.
         of_sites: dict[str, list[int]] = {}
         for number, blast in enumerate(blasts):
             of_sites.setdefault(blast.scenario.content_hash, []).append(number)
-        for numbers in of_sites.values():
-            own = [blasts[number] for number in numbers]
-            # The first site compiles everything; to listen takes longer than a prediction.
-            compiles = compilation_notice("the surrogate (some 10 s)")
-            with nullcontext() if self._sites else compiles:
-                served = self._site(own[0].scenario)
-                charges = [charge_against(*number[:3]) for number in own]
-                layouts = [number.layout for number in own]
-                guess = self.surrogate.guess(served.site, layouts, charges)
-            for number, loads in zip(numbers, served.loads(guess), strict=True):
-                found[number] = loads
+        # The first site compiles everything; to listen takes longer than a prediction.
+        compiles = compilation_notice("the surrogate (some 10 s)")
+        numbers_of_sites = [*of_sites.values()]
+        with nullcontext() if self._sites else compiles:
+            for first in range(0, len(numbers_of_sites), _SITES_AT_ONCE):
+                some = numbers_of_sites[first : first + _SITES_AT_ONCE]
+                for numbers, loads in zip(some, self._loads_of_sites(blasts, some), strict=True):
+                    for number, one in zip(numbers, loads, strict=True):
+                        found[number] = one
         return [blast_loads for blast_loads in found if blast_loads is not None]
+
+    def _loads_of_sites(
+        self, blasts: Sequence[EngineBlast], sites: Sequence[Sequence[int]]
+    ) -> list[list[BlastLoads]]:
+        """Return the loads of the numbered blasts of each of some sites."""
+        served, asked = [], []
+        for numbers in sites:
+            own = [blasts[number] for number in numbers]
+            served.append(self._site(own[0].scenario))
+            charges = [charge_against(*blast[:3]) for blast in own]
+            asked.append((served[-1].site, [blast.layout for blast in own], charges))
+        pairs = zip(served, self.surrogate.guesses(asked), strict=True)
+        return [item.loads(guess) for item, guess in pairs]
 
     def _site(self, scenario: Scenario) -> _SiteLoads:
         key = scenario.content_hash

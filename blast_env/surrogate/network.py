@@ -4,13 +4,12 @@ Each solid sends a message to each point, computed from their relations. The pre
 is a function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from itertools import zip_longest
 from math import prod
-from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
@@ -34,6 +33,11 @@ from blast_env.surrogate.ways import SHARES
 IntArray = NDArray[np.int64]
 AnyFloats = NDArray[np.floating[Any]]
 _PACKAGED: Final = Path(__file__).with_name("gas.json")
+
+Asked = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
+"""A site, its layouts, and the charge against each of them."""
+
+_Met = tuple[Approach, PieceKnowledge, Numbers]
 
 HIDDEN: Final = 64
 """Width of the two hidden layers."""
@@ -305,6 +309,35 @@ class Surrogate:
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
+        return self.guesses([(site, layouts, charges)])[0]
+
+    def guesses(self, asked: Sequence[Asked]) -> list[Guess]:
+        """Return the predicted loads of layouts on several sites; see `guess`.
+
+        Args:
+            asked: A site, its layouts and the charge against each of them.
+        """
+        parts = [self._parts(*one) for one in asked]
+        found: list[list[FloatArray]] = [[] for _ in asked]
+        for which in range(2):
+            counted = [n for n, (site, *_) in enumerate(asked) if site.counts_peaks or not which]
+            if not counted:
+                break
+            both = self._loads([met for number in counted for met in parts[number][0]], which)
+            first = 0
+            for number in counted:
+                (site, layouts, _), place = asked[number], parts[number][1]
+                after = first + len(layouts) * len(site.protected)
+                found[number] += [
+                    item[first:after].reshape(len(layouts), -1)[place] for item in both
+                ]
+                first = after
+        return [Guess(*one) for one in found]
+
+    def _parts(
+        self, site: SurrogateSite, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
+    ) -> tuple[list[_Met], IntArray]:
+        """Return what is met on a site by charge, and where each layout is among all of them."""
         # 1. Layouts by their charge, whose paths and relations they share.
         of_charges: dict[Charge, list[int]] = {}
         for number, charge in enumerate(charges):
@@ -318,27 +351,21 @@ class Surrogate:
         met = [(approach, *self._met(site, approach, boxes)) for approach, boxes in groups]
         place = np.empty(len(layouts), dtype=np.int64)
         place[[number for numbers in of_charges.values() for number in numbers]] = range(len(place))
+        return met, place
+
+    def _loads(self, met: Sequence[_Met], which: int) -> tuple[FloatArray, FloatArray]:
+        """Return one kind of load on the structures of all layouts, and its spread (loads,)."""
+        power = self._of_loads[which][1]
+        # 3. ln load = ln of Kingery and Bulmash's + what the networks add, at each point.
+        differs = [item.differs(own, which) for _, item, own in met]
+        logs = [np.tile((item.log_impulse, item.log_peak)[which], len(own)) for item, _, own in met]
         area_m2 = np.concatenate([np.tile(item.area_m2, len(own)) for item, _, own in met])
-        starts = self._starts(met)
-
-        def of(which: int, known: Callable[[Approach], FloatArray]) -> list[FloatArray]:
-            power = self._of_loads[which][1]
-            # 3. ln load = ln of Kingery and Bulmash's + what the networks add, at each point.
-            differs = [item.differs(own, which) for _, item, own in met]
-            logs = [np.tile(known(item), len(own)) for item, _, own in met]
-            # 4. The mean over the points of each structure, by each network.
-            loads = log_loads(
-                np.concatenate(differs, axis=1), np.concatenate(logs), area_m2, starts, power
-            )
-            # 5. The prediction and its spread over the networks, which were fitted from different
-            # beginnings (deep ensembles, Lakshminarayanan et al. 2017).
-            both = _mean_and_spread(loads)
-            return [estimate.reshape(len(layouts), -1)[place] for estimate in both]
-
-        impulse = of(0, attrgetter("log_impulse"))
-        if not site.counts_peaks:
-            return Guess(*impulse)
-        return Guess(*impulse, *of(1, attrgetter("log_peak")))
+        # 4. The mean over the points of each structure, by each network.
+        all_differ: FloatArray = np.concatenate(differs, axis=1)
+        loads = log_loads(all_differ, np.concatenate(logs), area_m2, self._starts(met), power)
+        # 5. The prediction and its spread over the networks, which were fitted from different
+        # beginnings (deep ensembles, Lakshminarayanan et al. 2017).
+        return _mean_and_spread(loads)
 
     def upper_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
@@ -427,7 +454,7 @@ class Surrogate:
         return site.memory.numbers_of((self, approach, site.counts_peaks), make, layouts)
 
     @staticmethod
-    def _starts(met: Sequence[tuple[Approach, PieceKnowledge, Numbers]]) -> IntArray:
+    def _starts(met: Sequence[_Met]) -> IntArray:
         """Return the first row of each structure of each layout (layouts x structures,)."""
         found, first = [], 0
         for approach, known, layouts in met:
