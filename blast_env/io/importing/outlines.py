@@ -57,6 +57,9 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
 def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
     """Return an outline without self-intersections, possibly in several parts.
 
+    What lies in several of its outlines, or is gone round twice, is inside; what lies in any of its
+    courtyards is not, nor is the rest of a courtyard that sticks out.
+
     Args:
         outline: Any outline.
         what: Description of the outline, for the error.
@@ -71,7 +74,9 @@ def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
             f"{what} crosses itself more than {MOST_CROSSINGS:,} times, must cross itself at most "
             "that often for --repair"
         )
-    return shapely.buffer(shapely.make_valid(outline), 0.0)
+    # The usual method, "linework", takes what lies in an even number of rings for outside.
+    sound = shapely.make_valid(outline, method="structure", keep_collapsed=False)
+    return shapely.buffer(sound, 0.0)
 
 
 def _crosses_often(outline: BaseGeometry) -> bool:

@@ -19,6 +19,11 @@ PLACE = charge(12.0, 2.0)
 BOW: Places = [(0, 0), (6, 4), (6, 0), (0, 4)]
 
 
+def square(low_m: float, high_m: float) -> list[list[float]]:
+    corners = ((low_m, low_m), (high_m, low_m), (high_m, high_m), (low_m, high_m))
+    return [[*corner] for corner in (*corners, corners[0])]
+
+
 def error_of(path: Path, options: ImportOptions | None = None, **others: Any) -> str:
     """Return the message of the error, which names the file."""
     with pytest.raises(BlastEnvError) as caught:
@@ -172,6 +177,26 @@ def test_outlines_that_cross_themselves(tmp_path: Path) -> None:
     site = import_site(path, ImportOptions(repair=True))
     assert "corrected: 1" in site.notes[0]
     assert site.buildings[0].outline.area == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(
+    ("rings", "area_m2"),
+    [
+        ([[square(0, 20)], [square(10, 30)]], 700.0),  # two houses that overlap
+        ([[square(0, 20), square(10, 24)]], 300.0),  # a courtyard that sticks out
+        ([[square(0, 20), square(30, 34)]], 400.0),  # a courtyard outside
+        ([[square(0, 20), square(4, 12), square(8, 16)]], 288.0),  # courtyards that overlap
+    ],
+)
+def test_a_repair_covers_what_lies_in_an_outline_and_in_no_courtyard(
+    rings: Any, area_m2: float, tmp_path: Path
+) -> None:
+    geometry = {"type": "MultiPolygon", "coordinates": rings}
+    tags = {"building": "yes", "protected": True}
+    feature = {"type": "Feature", "properties": tags, "geometry": geometry}
+    options = ImportOptions(repair=True, crs="local", charge_at=((-8.0, -8.0),))
+    site = import_site(written(tmp_path, feature), options)
+    assert sum(part.polygon.area for part in site.buildings[0].polygons) == pytest.approx(area_m2)
 
 
 def test_site_that_is_too_large(tmp_path: Path) -> None:
