@@ -8,12 +8,12 @@ on its right. A wave that goes to and fro between walls has its first images as 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 
 WIDTH: Final = 0.2
 """Difference of ways that makes the bell, m/kg^(1/3)."""
@@ -64,10 +64,18 @@ class _Faces:
             top=np.tile(boxes[:, 5], 4),
         )
 
+    def towards(self, charge: FloatArray, bays: FloatArray, normal: FloatArray) -> "_Faces":
+        """Return those that face a charge and a bay, and not the way of the bays' wall."""
+        facing = self.outward * normal[self.axis] < 0.5
+        for places in (charge, bays):
+            ends = np.where(self.outward > 0.0, places.max(0)[self.axis], places.min(0)[self.axis])
+            facing &= self.outward * (ends - self.at) > _CLEAR
+        return _Faces(*(getattr(self, own.name)[facing] for own in fields(self)))
+
 
 def _reflected(
     faces: _Faces, charge: FloatArray, bays: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[tuple[IntArray, IntArray], FloatArray, FloatArray, FloatArray]:
     """Return the ways from bays to the images of the charge behind walls, and how much they meet.
 
     Args:
@@ -76,36 +84,36 @@ def _reflected(
         bays: Middles of the bays (bays, 3).
 
     Returns:
-        The ways (bays, faces, 3), their lengths (bays, faces), and the share of the bell that meets
-        the wall, 0 where charge or bay is behind it (bays, faces).
+        Of the pairs of a bay and a wall that faces it and the charge: the bays and walls, the ways
+        (pairs, 3), their lengths (pairs,), and the share of the bell that meets the wall (pairs,).
     """
     from scipy.special import ndtr  # takes a while to import
 
     # (1) Walls that face the charge, and bays before them.
     before_charge = faces.outward * (charge[:, faces.axis] - faces.at)
     before_bay = faces.outward * (bays[:, faces.axis] - faces.at)
-    valid = (before_charge > _CLEAR) & (before_bay > _CLEAR)
+    bay, wall = np.nonzero((before_charge > _CLEAR) & (before_bay > _CLEAR))
     # (2) The image, where its way crosses the wall, and the share of the bell on the wall.
-    image = np.repeat(charge[:, np.newaxis], len(faces.at), axis=1)
-    index = np.arange(len(faces.at))
-    image[:, index, faces.axis] = 2.0 * faces.at - charge[:, faces.axis]
-    ways = image - bays[:, np.newaxis]
-    longer = np.linalg.norm(ways, axis=2)
-    total = np.maximum(before_charge + before_bay, _LEAST)
-    share = np.clip(before_charge / total, 0.0, 1.0)
-    crossing = image - ways * share[..., np.newaxis]
+    pairs, axis = np.arange(len(bay)), faces.axis[wall]
+    image = charge[bay]
+    image[pairs, axis] = 2.0 * faces.at[wall] - image[pairs, axis]
+    ways = image - bays[bay]
+    longer = np.linalg.norm(ways, axis=1)
+    first = before_charge[bay, wall]
+    total = np.maximum(first + before_bay[bay, wall], _LEAST)
+    share = np.clip(first / total, 0.0, 1.0)
+    crossing = image - ways * share[:, np.newaxis]
     d1, d2 = share * longer, (1.0 - share) * longer
     bell = np.maximum(np.sqrt(WIDTH * d1 * d2 / np.maximum(longer, _LEAST)), _LEAST)
-    slant = np.maximum(total / np.maximum(longer, _LEAST), 0.1)
-    across = crossing[:, index, 1 - faces.axis]
-    wide = ndtr((faces.high - across) * slant / bell) - ndtr((faces.low - across) * slant / bell)
-    up = crossing[..., 2]
+    slant = np.maximum(total / np.maximum(longer, _LEAST), 0.1) / bell
+    along, up = crossing[pairs, 1 - axis], crossing[:, 2]
+    wide = ndtr((faces.high[wall] - along) * slant) - ndtr((faces.low[wall] - along) * slant)
 
     def below(height: FloatArray) -> FloatArray:
         return np.asarray(ndtr((height - up) / bell) + ndtr((height + up) / bell) - 1.0)
 
-    met = np.where(valid, wide * np.maximum(below(faces.top) - below(faces.base), 0.0), 0.0)
-    return ways, longer, met
+    met = wide * np.maximum(below(faces.top[wall]) - below(faces.base[wall]), 0.0)
+    return (bay, wall), ways, longer, met
 
 
 def numbers_of_echoes(
@@ -131,16 +139,17 @@ def numbers_of_echoes(
     sums = np.zeros((len(bays), 3))
     near = np.zeros((len(bays), 3))
     if len(boxes):
-        faces = _Faces.of(boxes)
-        ways, longer, met = _reflected(faces, charge, bays)
+        faces = _Faces.of(boxes).towards(charge, bays, normal)
+        (bay, wall), ways, longer, met = _reflected(faces, charge, bays)
         # (3) The weight of an echo by distance and incidence, relative to the charge itself.
         own = np.maximum(ways @ normal / np.maximum(longer, _LEAST), 0.0)
         incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
-            _SLANT + (1.0 - _SLANT) * np.maximum(cosine, 0.0)[:, np.newaxis] ** 2
+            _SLANT + (1.0 - _SLANT) * np.maximum(cosine[bay], 0.0) ** 2
         )
-        weight = met * incidence * (distance[:, np.newaxis] / longer) ** _EXPONENT
-        later = np.maximum(longer - distance[:, np.newaxis], _LEAST)
-        closeness = met * np.log1p(distance[:, np.newaxis] / later)
+        later = np.maximum(longer - distance[bay], _LEAST)
+        weight, closeness = np.zeros((2, len(bays), len(faces.at)))
+        weight[bay, wall] = met * incidence * (distance[bay] / longer) ** _EXPONENT
+        closeness[bay, wall] = met * np.log1p(distance[bay] / later)
         # (4) Opposite, left and right of the bay's wall.
         outward = np.zeros((len(faces.at), 2))
         outward[np.arange(len(faces.at)), faces.axis] = faces.outward

@@ -14,6 +14,7 @@ the ground end at 2.9 m/kg^(1/3): nearer, gas dynamics can have more than screen
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from math import ceil, hypot
 from typing import Final, Literal
 
@@ -86,6 +87,7 @@ class BayScreening:
         factor: What that does to the impulse: best estimate, lower and upper end.
         edges: What the edges of its wall and the angle of the wave do to the impulse of the curves.
         likely_pa_s: The best estimate of the impulse; what counts is on the safe side of it.
+        likely_peak_pa: That of the peak.
     """
 
     filled: FacadeBay
@@ -99,6 +101,7 @@ class BayScreening:
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
     edges: float = 1.0
     likely_pa_s: float = 0.0
+    likely_peak_pa: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -272,7 +275,7 @@ def screen(
         places = [*_places(scenario, own, layout)]
         key = tuple((place.position_m, place.height_m) for place in places)
         if key not in known_places:
-            known_places[key] = facade.seen_from(places)
+            known_places[key] = facade.ways_from(places, by_sight=atlas is None)
         screened.append(_screened(name, facade, places, known_places[key], changed))
     named_bays = scenario.named_bays(layout)
     storeys = [bay.bay.height_m for bay in bays]
@@ -432,14 +435,21 @@ class _Facade:
             numbers.append(known[key])
         return np.array(numbers), parts
 
-    def seen_from(self, places: Sequence[Charge]) -> Ways:
-        """Return the ways from places to the bays (places, bays)."""
-        found = []
+    def ways_from(self, places: Sequence[Charge], by_sight: bool) -> Ways:
+        """Return the ways from places to the bays (places, bays).
+
+        By sight, those in sight are seen, else none: the atlas needs no lines of sight.
+        """
+        found, nothing = [], np.zeros(len(self.bays), dtype=bool)
         for place in places:
-            seen = in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
+            seen = self.sees(place) if by_sight else nothing
             charge_m = (*place.position_m, place.height_m)
             found.append(Ways.between(charge_m, self.middles_m, self.outward, seen))
         return Ways(*(np.stack(own) for own in zip(*found, strict=True)))
+
+    def sees(self, place: Charge) -> BoolArray:
+        """Return whether each bay is in sight of a place (bays,)."""
+        return in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
 
 
 def _ends_m(bays: Sequence[FacadeBay]) -> FloatArray:
@@ -536,9 +546,10 @@ def _screened(
         # takes nothing off.
         seen = ways._replace(seen=around.faces.reshape(ways.away_m.shape))
     peaks, impulses = (in_the_open(part, seen, tnt_kg, height_m) for part in _LOADS)
-    likely = impulses
+    likely = peaks, impulses
     if around is not None:
-        likely = impulses * around.likely[:, 0].reshape(impulses.shape)
+        factors = around.likely.reshape((*impulses.shape, 2))
+        likely = peaks * factors[..., 1], impulses * factors[..., 0]
         factors = around.counted.reshape((*impulses.shape, 2))
         impulses, peaks = impulses * factors[..., 0], peaks * factors[..., 1]
     numbers, parts = facade.kinds
@@ -548,14 +559,15 @@ def _screened(
         damage[:, which] = _tabulated(own_parts, peaks[:, which], impulses[:, which])
     order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
-    own = _named(atlas, places[worst])
+    own, in_view = _named(atlas, places[worst]), facade.sees(places[worst])
     bays = []
     for index, filled in enumerate(facade.bays):
         load = float(peaks[worst, index]), float(impulses[worst, index])
         response = respond([filled], *triangle(*load))
-        away_m, is_seen = ways.away_m[worst, index], ways.seen[worst, index]
-        found = BayScreening(filled, float(away_m), bool(is_seen), *load, response)
-        found = replace(found, likely_pa_s=float(likely[worst, index]))
+        away_m, is_seen = float(ways.away_m[worst, index]), bool(in_view[index])
+        found = BayScreening(filled, away_m, is_seen, *load, response)
+        peak_pa, pa_s = (float(load[worst, index]) for load in likely)
+        found = replace(found, likely_pa_s=pa_s, likely_peak_pa=peak_pa)
         if own is not None:
             middle, low, high = (float(part[index, 0]) for part in own.factors[:3])
             found = replace(
@@ -580,16 +592,32 @@ def _tabulated(
     parts: Sequence[Pane | Panel], peak_pa: FloatArray, impulse_pa_s: FloatArray
 ) -> FloatArray:
     """Return the damage of the worst of some parts under many loads, by a table of it."""
-    from scipy.interpolate import RegularGridInterpolator  # takes a while to import
-
-    logarithms = np.log(peak_pa), np.log(impulse_pa_s)
-    axes = [np.linspace(axis.min(), axis.max() + 1e-6, _POINTS) for axis in logarithms]
-    peaks, impulses = (np.exp(axis).tolist() for axis in axes)
-    table = [
-        [
-            max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
-            for impulse in impulses
-        ]
-        for peak in peaks
+    axes = [
+        np.linspace(own.min(), own.max() + 1e-6, _POINTS)
+        for own in (np.log(peak_pa), np.log(impulse_pa_s))
     ]
-    return np.asarray(RegularGridInterpolator(axes, table)(logarithms))
+    # Bilinear: SciPy's interpolators take longer to import than this table takes.
+    (row, down), (column, across) = (
+        _between(axis, np.log(own)) for axis, own in zip(axes, (peak_pa, impulse_pa_s), strict=True)
+    )
+    # Loads fall together with distance, so that most of the table is not asked for.
+    asked = np.zeros((_POINTS, _POINTS), dtype=bool)
+    for more in product((0, 1), repeat=2):
+        asked[row + more[0], column + more[1]] = True
+    table = np.zeros(asked.shape)
+    for own in zip(*np.nonzero(asked), strict=True):
+        load = (float(np.exp(axis[index])) for axis, index in zip(axes, own, strict=True))
+        peak, impulse = load
+        table[own] = max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
+    first, last = (
+        (1.0 - across) * table[own, column] + across * table[own, column + 1]
+        for own in (row, row + 1)
+    )
+    return np.asarray((1.0 - down) * first + down * last)
+
+
+def _between(axis: FloatArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the interval of an even axis in which each value lies, and its share of it."""
+    at = (values - axis[0]) / (axis[1] - axis[0])
+    index = np.clip(at.astype(int), 0, len(axis) - 2)
+    return index, at - index
