@@ -4,7 +4,12 @@ An obstacle takes away a part of the zone through which the wave reaches the bay
 straight way, of variance `width * d1 d2 / (d1 + d2)` in the plane of the obstacle, where d1 and d2
 are its distances from the charge and from the bay, and `width` is a difference of ways (Fresnel's
 zones). The ground mirrors it. What obstacles take away of several bells, narrow and wide, their
-distances and their thickness are the numbers of a law. Without an obstacle nothing is taken away.
+distances and their thickness are the numbers of a law, with the bay's height and angle, since the
+wave that comes over an obstacle meets low bays otherwise than high ones. Without an obstacle
+nothing is taken away.
+
+Obstacles throw waves back on a bay, too, as fronts do. The law is of what they leave apart from
+that: its factor is multiplied by those of echoes.
 """
 
 from collections.abc import Sequence
@@ -14,16 +19,26 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.atlas.echoes import NUMBERS as ECHOES
 
 WIDTHS: Final = (0.03, 0.2, 1.0)
 """Differences of ways that make the bells, m/kg^(1/3)."""
+
+_MIDDLE: Final = 1  # of the widths
 
 _TOGETHER: Final = 0.3
 """Obstacles whose middles are nearer to each other than this along the normal of the bay's wall,
 m/kg^(1/3), stand in one row."""
 
 _LEAST: Final = 0.02  # m/kg^(1/3): distances and bells are at least so large
+_REACH: Final = 5.0  # of a bell, in its widths
 _NOTHING: Final = 1e-3  # share of a bell that is not worth a row
+_LEAST_COSINE: Final = 0.61
+_HIGH: Final = (0.25, 1.7)
+_BUILDING: Final = (0.5, 2.0)
+_NEAR: Final = 1.9
+"""Ends of the ranges of the blasts, for numbers that hardly change the factor beyond them."""
+
 _BEFORE: Final = 0.04  # m/kg^(1/3) before a wall: what lies behind that does not shield it
 
 
@@ -33,6 +48,7 @@ class Row:
 
     Attributes:
         taken: Share of each bell that it takes away (bays, widths).
+        across: Share of the middle bell that it would take away if it were endlessly high (bays,).
         from_charge: Distance from the charge, m/kg^(1/3) (bays,).
         from_bay: Distance from the bay (bays,).
         thickness: Way of the line of sight through it (bays,).
@@ -40,6 +56,7 @@ class Row:
     """
 
     taken: FloatArray
+    across: FloatArray
     from_charge: FloatArray
     from_bay: FloatArray
     thickness: FloatArray
@@ -83,6 +100,7 @@ class _Parts:
     """What each obstacle takes of the bells of each bay (bays, boxes, ...)."""
 
     taken: FloatArray
+    across: FloatArray
     along: FloatArray
     way: FloatArray
     thickness: FloatArray
@@ -112,7 +130,8 @@ class _Parts:
         level = np.abs(unit)[:, np.newaxis] < 1e-9
         near = np.where(level, np.where(inside, -np.inf, np.inf), np.minimum(first, last))
         far = np.where(level, np.where(inside, np.inf, -np.inf), np.maximum(first, last))
-        enter, leave = near.max(axis=2), far.min(axis=2)
+        enter = np.maximum(near[..., 0], near[..., 1])
+        leave = np.minimum(far[..., 0], far[..., 1])
         cuts = enter < leave
         whole = length[:, np.newaxis]
         enter, leave = np.clip(enter, 0.0, whole), np.clip(leave, 0.0, whole)
@@ -127,19 +146,27 @@ class _Parts:
         d2 = np.maximum((whole - along) * slope, _LEAST)
         up = charge[:, 2, np.newaxis]
         line = up + (bays[:, 2, np.newaxis] - up) * share
-        taken = np.empty((*along.shape, len(WIDTHS)))
         left, right = e.min(axis=2), e.max(axis=2)
+        # Only where the widest bell meets the box: most pairs are far aside, or not between.
+        widest = _REACH * np.maximum(np.sqrt(WIDTHS[-1] * d1 * d2 / (d1 + d2)), _LEAST)
+        pairs = np.nonzero(valid & (left < widest) & (right > -widest))
+        taken, endless = np.zeros((*along.shape, len(WIDTHS))), np.zeros(along.shape)
+        low_up, high_up = boxes[pairs[1], 4], boxes[pairs[1], 5]
+        left, right, line = left[pairs], right[pairs], line[pairs]
+        zone = (d1 * d2 / (d1 + d2))[pairs]
         for k, width in enumerate(WIDTHS):
-            bell = np.maximum(np.sqrt(width * d1 * d2 / (d1 + d2)), _LEAST)
+            bell = np.maximum(np.sqrt(width * zone), _LEAST)
             across = ndtr(right / bell) - ndtr(left / bell)
 
             def below(height: FloatArray, bell: FloatArray = bell) -> FloatArray:
                 mirrored = ndtr((height - line) / bell) + ndtr((height + line) / bell) - 1.0
                 return np.asarray(np.maximum(mirrored, 0.0))
 
-            high_share = below(boxes[:, 5]) - below(boxes[:, 4])
-            taken[..., k] = np.where(valid, across * high_share, 0.0)
-        return cls(taken, d1, d2, thickness)
+            base = below(low_up) if low_up.any() else np.zeros(len(low_up))
+            taken[pairs[0], pairs[1], k] = across * (below(high_up) - base)
+            if k == _MIDDLE:
+                endless[pairs] = across * (1.0 - base)
+        return cls(taken, endless, d1, d2, thickness)
 
     def row(self, members: IntArray, indices: IntArray) -> Row:
         """Return a row of some of the obstacles."""
@@ -152,6 +179,7 @@ class _Parts:
 
         return Row(
             np.minimum(taken.sum(axis=1), 1.0),
+            np.minimum(self.across[:, members].sum(axis=1), 1.0),
             mean(self.along),
             mean(self.way),
             mean(self.thickness),
@@ -159,13 +187,26 @@ class _Parts:
         )
 
 
-def numbers_between(row: Row, charge: FloatArray) -> FloatArray:
+def numbers_between(
+    row: Row,
+    charge: FloatArray,
+    bays: FloatArray,
+    normal: FloatArray,
+    high: FloatArray,
+    fronts: FloatArray,
+) -> FloatArray:
     """Return the numbers of the law of one row (bays, numbers), see `NUMBERS`.
 
     Args:
         row: The row.
         charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
+        bays: Middles of the bays (bays, 3).
+        normal: Outward normal of their wall (3,).
+        high: Height of the building of each bay (bays,).
+        fronts: Numbers of the echoes of all that stands before the wall (bays, echoes' numbers).
     """
+    way = charge - bays
+    cosine = way @ normal / np.maximum(np.linalg.norm(way, axis=1), _LEAST)
     return np.column_stack(
         [
             row.taken,
@@ -173,6 +214,11 @@ def numbers_between(row: Row, charge: FloatArray) -> FloatArray:
             np.log(row.from_bay),
             np.sqrt(row.thickness),
             np.broadcast_to(charge[..., 2], len(row.taken)),
+            np.maximum(cosine, _LEAST_COSINE),
+            np.clip(bays[:, 2], *_HIGH),
+            np.clip(high, *_BUILDING),
+            row.across,
+            np.minimum(fronts[:, ECHOES.index("near_beside")], _NEAR),
         ]
     )
 
@@ -183,5 +229,10 @@ NUMBERS: Final[Sequence[str]] = (
     "ln_from_bay",
     "root_thickness",
     "charge_height",
+    "cosine",
+    "bay_height",
+    "building_height",
+    "across",
+    "near_beside",
 )
 """Names of the columns of `numbers_between`."""

@@ -228,6 +228,7 @@ class Laws(BaseModel):
         opposite: Of fronts opposite a bay that throw the wave back: streets, a front behind the
             charge.
         beside: Of walls beside it: courts, re-entrant corners, the end of a street.
+        attached: Of what adjoins a wall under or over a bay: canopies, projecting storeys, podiums.
         shadow: Of walls that face away, relative to the side-on load.
         about: Origin: command, versions, engine, blasts.
     """
@@ -238,6 +239,7 @@ class Laws(BaseModel):
     between: Law
     opposite: Law
     beside: Law
+    attached: Law
     shadow: Law
     about: Annotated[Mapping[str, str], Field(default_factory=dict)]
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.atlas import between, echoes, edges, shadow
+from blast_env.atlas import attached, between, echoes, edges, shadow
 from blast_env.atlas.laws import Factors, Laws, packaged_laws
 from blast_env.site.blast_site import BlastSite
 
@@ -44,6 +44,12 @@ class Solid:
     boxes: FloatArray
     names: tuple[str, ...]
     structures: tuple[str, ...]
+
+    def only(self, chosen: BoolArray) -> "Solid":
+        """Return some of the boxes."""
+        which = np.flatnonzero(chosen).tolist()
+        names, structures = (tuple(own[k] for k in which) for own in (self.names, self.structures))
+        return Solid(self.boxes[chosen], names, structures)
 
     @cached_property
     def is_building(self) -> BoolArray:
@@ -221,21 +227,28 @@ class SiteAtlas:
         count = len(wall.middles)
         every = np.ones(count, dtype=bool)
         own_edges, near = self._edges(wall)
+        adjoins = attached.is_attached(wall.middles, wall.normal, solid.boxes)
+        before = between.lies_before(wall.middles, wall.normal, solid.boxes)
+        before &= ~adjoins | (solid.boxes[:, 4] == 0.0)  # what hangs on the wall is no front
+        fronts = wall.echoes_of(solid.boxes[before])
+        has_pieces = bool((before & ~solid.is_building).any())
+        buildings = (
+            wall.echoes_of(solid.boxes[before & solid.is_building]) if has_pieces else fronts
+        )
         factors, notes = Factors.none(count), [near]
         governing: list[tuple[Factors, str]] = []
-        for row in between.rows_between(wall.charge, wall.middles, wall.normal, solid.boxes):
-            own = self._laws.between.factors(between.numbers_between(row, wall.charge))
-            tallest = row.members[int(solid.boxes[row.members, 5].argmax())]
-            governing.append((own, f"behind {solid.names[tallest]}"))
+        free = solid.only(~adjoins)
+        for row in between.rows_between(wall.charge, wall.middles, wall.normal, free.boxes):
+            numbers = between.numbers_between(
+                row, wall.charge, wall.middles, wall.normal, wall.high, fronts
+            )
+            own = self._laws.between.factors(numbers)
+            tallest = row.members[int(free.boxes[row.members, 5].argmax())]
+            governing.append((own, f"behind {free.names[tallest]}"))
             factors = factors.least(own.where_known())
         for own, name in governing:
             counts = own.middle[:, 0] <= factors.middle[:, 0]  # the row that takes most
             notes.append(_Note.of(name, own, counts))
-        before = between.lies_before(wall.middles, wall.normal, solid.boxes)
-        buildings, fronts = (
-            echoes.numbers_of_echoes(wall.charge, wall.middles, wall.normal, boxes, wall.high)
-            for boxes in (solid.boxes[before & solid.is_building], solid.boxes[before])
-        )
         for law, name in (
             (self._laws.opposite, "a front opposite"),
             (self._laws.beside, "walls beside"),
@@ -246,7 +259,24 @@ class SiteAtlas:
             own = law.factors(fronts).where_in_range(law.factors(buildings))
             notes.append(_Note.of(name, own, every))
             factors = factors.times(own)
+        if adjoins.any():
+            own, note = self._adjoining(wall, solid.only(adjoins))
+            factors = factors.times(own)
+            notes.append(note)
         return _Around(own_edges, factors, notes)
+
+    def _adjoining(self, wall: "_Wall", solid: Solid) -> tuple[Factors, "_Note"]:
+        """Return what canopies and podiums do; outside the range they take nothing off."""
+        numbers = attached.numbers_of_attached(
+            wall.charge, wall.middles, wall.normal, solid.boxes, wall.high
+        )
+        own = self._laws.attached.factors(numbers)
+        note = _Note.of(
+            f"{solid.names[0]} against its wall", own, np.ones(len(numbers), dtype=bool)
+        )
+        kept = own.in_range[:, np.newaxis]
+        middle, low, high = (np.where(kept, part, np.maximum(part, 1.0)) for part in own[:3])
+        return Factors(middle, low, high, own.in_range), note
 
     def _edges(self, wall: "_Wall") -> tuple[Factors, "_Note"]:
         """Return what the edges of a wall do, and a note if the charge is too near to it."""
@@ -290,6 +320,10 @@ class _Wall:
     normal: FloatArray
     high: FloatArray
     ends: FloatArray
+
+    def echoes_of(self, boxes: FloatArray) -> FloatArray:
+        """Return the numbers of the echoes of some boxes (bays, numbers)."""
+        return echoes.numbers_of_echoes(self.charge, self.middles, self.normal, boxes, self.high)
 
 
 def _ones(bays: int) -> Factors:

@@ -19,7 +19,6 @@ from blast_env.provenance import versions
 from blast_env.tables import markdown_table
 from blast_env.units import MODULE_SIDE_M
 from studies.atlas import findings
-from studies.atlas.clipping import Clipping
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES, fit_all
 from studies.atlas.runs import (
@@ -28,13 +27,14 @@ from studies.atlas.runs import (
     FINE,
     groups_in,
     groups_of,
+    restore,
     rounds,
     run_group,
     table_of_runs,
 )
 from studies.atlas.samples import Bays, Group, scenes_with_loads
 from studies.atlas.scenes import CUBE_ROOT, scaled_impulse
-from studies.atlas.sites import SITES, on_site
+from studies.atlas.sites import LARGE, SITES, on_site
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
@@ -51,9 +51,12 @@ def run(
     out: Runs = Path("out/atlas"),
     groups: Annotated[int, typer.Option(min=1, help="Groups of each family.")] = 40,
     minutes: Annotated[float, typer.Option(help="End after this time.")] = 1e6,
+    data: Annotated[Path, typer.Option(help="Table whose blasts are not run again.")] = DATA,
 ) -> None:
-    """Run the blasts of families in turn; those in the folder are not run again."""
+    """Run the blasts of families in turn; those in the folder or the table are not run again."""
     with user_errors():
+        if data.exists():
+            restore(_read(data), out)
         names = family or [*FAMILIES]
         for name in names:
             if name not in FAMILIES:
@@ -155,8 +158,8 @@ def check(
 ) -> None:
     """Run designs that no law was fitted to; print how many bays lie in the intervals."""
     with user_errors():
-        known = [name for recipe in RECIPES.values() for name in recipe.families]
-        names = family or known
+        known = dict.fromkeys(name for recipe in RECIPES.values() for name in recipe.families)
+        names = family or [*known]
         for name in names:
             if name not in known:
                 raise UnknownNameError("family", name, known)
@@ -196,20 +199,17 @@ def cases(
 @app.command()
 def sites(
     name: Annotated[list[str] | None, typer.Argument(help="Bundled sites.")] = None,
-    data: Data = DATA,
     out: Annotated[Path, typer.Option(help="Folder of the blasts.")] = Path("out/atlas_sites"),
 ) -> None:
     """Compare screening without and with the atlas with gas dynamics, bay by bay."""
     with user_errors():
-        frame = _read(data)
-        clipping = Clipping.of(*(groups_of(frame, own.cell_m) for own in (COARSE, FINE)))
         found = [
             own
-            for site in name or SITES
+            for site in name or (*SITES, *LARGE)
             for has_layout in (False, True)
-            for own in on_site(site, has_layout, packaged_laws(), clipping, out)
+            for own in on_site(site, has_layout, packaged_laws(), out)
         ]
-        headers = ("site", "layout", "bays", "estimate of impulse, error of ln")
+        headers = ("site", "layout", "bays", "estimate of impulse, error of ln", "peak")
         more = ("impulse", "peak", "gas over screening, impulse", "peak")
         print_line(markdown_table((*headers, *more), findings.site_rows(found)))
 

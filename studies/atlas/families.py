@@ -366,6 +366,9 @@ def _table() -> Iterator[Family]:
     raised = {**_FACADE, "raised": (0.05, 1.2)}
     yield Family("raised", "a raised charge, without and with a wall", raised, _WALL, 5, _raised)
     yield Family("open", "a facade in the open", wide, {}, 0, _open)
+    far = {**_FACADE, "distance": (5.0, 14.0), "facade_height": (0.4, 2.0), "raised": (-0.8, 0.4)}
+    low = {**_WALL, "height": (0.05, 1.0), "share": (0.02, 0.95), "second": (-1.0, 0.0)}
+    yield Family("far", "a wall before a facade far away", far, low, 6, _walls)
     close = {**wide, "distance": (0.33, 1.3), "width": (0.5, 5.0), "aside": (0.0, 2.5)}
     yield Family("near", "a facade near the charge", close, {}, 0, _open)
 

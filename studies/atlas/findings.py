@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.atlas import Law, Laws
+from blast_env.atlas import Factors, Law, Laws
 from blast_env.atlas.between import numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
 from blast_env.atlas.laws import TOLERATED
@@ -14,8 +14,8 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES
-from studies.atlas.samples import Bays, Group, row_between, scenes_with_loads
-from studies.atlas.sites import SiteLoads
+from studies.atlas.samples import Bays, Group, less_echoes, row_between, scenes_with_loads
+from studies.atlas.sites import LARGE, SiteLoads
 
 Row = tuple[str, ...]
 
@@ -89,10 +89,13 @@ def error_rows(known: Laws) -> Iterator[Row]:
 def inside_rows(groups: Sequence[Group], known: Laws, families: Collection[str]) -> Iterator[Row]:
     """Yield one row per family: error of ln(factor), and the bays in the intervals."""
     totals = []
+    laws: dict[str, Law] = {name: getattr(known, name) for name in RECIPES}
+    judged: set[str] = set()  # a family by the first law that has it
     for name, recipe in RECIPES.items():
-        law: Law = getattr(known, name)
-        for family in (own for own in recipe.families if own in families):
-            own = recipe.samples(groups, [family])
+        law = laws[name]
+        for family in (own for own in recipe.families if own in {*families} - judged):
+            judged.add(family)
+            own = recipe.samples(groups, laws, [family])
             found, ratio = law.factors(own.numbers), np.exp(own.log_change)
             inside = (found.low <= ratio) & (ratio <= found.high)
             over = ratio / found.counted > TOLERATED
@@ -149,8 +152,9 @@ def rule_rows(scenes: Sequence[Bays], known: Laws) -> Iterator[Row]:
     for bays in scenes:
         rows = row_between(bays) if bays.family in ("wall", "rows") else []
         if len(rows) == 2:
-            factors.append(np.stack([known.between.log_factors(own) for own, _ in rows]))
-            measured.append(bays.log_change)
+            factors.append(np.stack([known.between.log_factors(own) for own in rows]))
+            (less,) = less_echoes([bays], [known.opposite, known.beside])
+            measured.append(less.log_change)
     both, target = np.concatenate(factors, axis=1), np.concatenate(measured)
     for name, found in (
         ("the product", both.sum(axis=0)),
@@ -171,9 +175,19 @@ def site_rows(found: Sequence[SiteLoads]) -> Iterator[Row]:
     """Yield one row per site, without and with a layout: errors without and with the atlas."""
     for own in found:
         yield _site_row(own.site, "best known" if own.has_layout else "none", [own])
-    for has_layout in (False, True):
-        parts = [own for own in found if own.has_layout == has_layout]
-        yield _site_row("all", "best known" if has_layout else "none", parts)
+    for title, large in (
+        ("all small ones", [False]),
+        ("all large ones", [True]),
+        ("all", [False, True]),
+    ):
+        for has_layout in (False, True):
+            parts = [
+                own
+                for own in found
+                if own.has_layout == has_layout and (own.site in LARGE) in large
+            ]
+            if parts:
+                yield _site_row(title, "best known" if has_layout else "none", parts)
 
 
 def _site_row(name: str, layout: str, parts: Sequence[SiteLoads]) -> Row:
@@ -183,12 +197,12 @@ def _site_row(name: str, layout: str, parts: Sequence[SiteLoads]) -> Row:
         off = np.log(np.concatenate(loads) / gas)
         cells.append((np.sqrt((off**2).mean(axis=0)), np.exp(-off).max(axis=0)))
     (before, low_before), (after, low_after) = cells
-    likely = np.log(np.concatenate([own.likely for own in parts]) / gas[:, 0])
+    likely = np.log(np.concatenate([own.likely for own in parts]) / gas)
     return (
         name,
         layout,
         str(len(gas)),
-        f"{np.sqrt((likely**2).mean()):.2f}",
+        *(f"{error:.2f}" for error in np.sqrt((likely**2).mean(axis=0))),
         *(f"{a:.2f} -> {b:.2f}" for a, b in zip(before, after, strict=True)),
         *(f"{a:.2f} -> {b:.2f}" for a, b in zip(low_before, low_after, strict=True)),
     )
@@ -210,15 +224,17 @@ def _scaled_bays() -> tuple[FloatArray, FloatArray, FloatArray]:
 def wall_case(known: Laws, boxes_m: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     """Return the mean factor of the facade behind boxes in m, and the ends of its interval."""
     charge, bays, normal = _scaled_bays()
-    boxes = np.array(boxes_m, dtype=float) / float(np.cbrt(_KG))
-    factors = None
+    scale = float(np.cbrt(_KG))
+    boxes, high = np.array(boxes_m, dtype=float) / scale, np.full(len(bays), 6.0 / scale)
+    fronts = numbers_of_echoes(charge, bays, normal, boxes, high)
+    factors = Factors.none(len(bays))
     for row in rows_between(charge, bays, normal, boxes):
-        own = known.between.factors(numbers_between(row, charge)).where_known()
-        factors = own if factors is None else factors.least(own)
-    if factors is None:
-        return 1.0, 1.0, 1.0
-    middle, low, high = (float(part[:, 0].mean()) for part in factors[:3])
-    return middle, low, high
+        numbers = numbers_between(row, charge, bays, normal, high, fronts)
+        factors = factors.least(known.between.factors(numbers).where_known())
+    for law in (known.opposite, known.beside):
+        factors = factors.times(law.factors(fronts))
+    middle, low, high_end = (float(part[:, 0].mean()) for part in factors[:3])
+    return middle, low, high_end
 
 
 def _wall(at_m: float, high_m: float, long_m: float = 20.0) -> tuple[float, ...]:

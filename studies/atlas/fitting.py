@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.atlas import between, echoes, edges, shadow
+from blast_env.atlas import attached, between, echoes, edges, shadow
 from blast_env.atlas.laws import FamilyError, Law, Laws
 from studies.atlas.families import FAMILIES
 from studies.atlas.samples import (
@@ -18,7 +18,9 @@ from studies.atlas.samples import (
     Numbers,
     Samples,
     impulses_in_the_open,
+    less_echoes,
     samples,
+    samples_attached,
     samples_between,
     samples_echoes,
     samples_edges,
@@ -46,6 +48,7 @@ def folds_of(groups: np.ndarray[Any, np.dtype[np.str_]], seed: int = 0) -> IntAr
 
 def fit(
     found: Samples,
+    judged: Collection[str],
     columns: Sequence[str],
     gates: Sequence[float],
     wider: Sequence[str],
@@ -56,6 +59,7 @@ def fit(
 
     Args:
         found: The samples.
+        judged: Families that intervals and errors are of.
         columns: Names of their numbers.
         gates: Share of each number in the gate.
         wider: Numbers, none of them negative, that make intervals wider if errors grow with them.
@@ -70,12 +74,13 @@ def fit(
         law = _fitted(numbers[rest], target[rest], columns, gates, hidden, decay)
         left[~rest] = law.log_factors(numbers[~rest])
     law = _fitted(numbers, target, columns, gates, hidden, decay)
-    law = _with_intervals(law, found, target - left, wider)
+    kept = np.isin(found.family, [*judged])
+    law = _with_intervals(law, numbers[kept], found.family[kept], (target - left)[kept], wider)
     width = law.width(numbers)[:, np.newaxis]
     below, above = np.array(law.below), np.array(law.above)
     inside = (target >= left - width * below) & (target <= left + width * above)
     families = {}
-    for name in FAMILIES:
+    for name in judged:
         own = found.family == name
         if own.any():
             families[name] = FamilyError(
@@ -89,16 +94,23 @@ def fit(
     return law.model_copy(update={"families": families})
 
 
-def _with_intervals(law: Law, found: Samples, off: FloatArray, wider: Sequence[str]) -> Law:
+def _with_intervals(
+    law: Law,
+    numbers: FloatArray,
+    family: np.ndarray[Any, np.dtype[np.str_]],
+    off: FloatArray,
+    wider: Sequence[str],
+) -> Law:
     """Return a law with the narrowest intervals that hold 90 % of the bays of each family.
 
     Args:
         law: The law without intervals.
-        found: The samples.
+        numbers: Numbers of the bays.
+        family: Their families.
         off: What the law leaves of ln(factor) where it was not fitted (bays, loads).
         wider: See `fit`.
     """
-    families = [found.family == name for name in np.unique(found.family)]
+    families = [family == name for name in np.unique(family)]
     best, least = law, np.inf
     # (1) Ends of the pooled intervals for each set of widths; (2) how much wider they must be for
     # the family that they hold worst; (3) the narrowest ones in the mean.
@@ -106,11 +118,11 @@ def _with_intervals(law: Law, found: Samples, off: FloatArray, wider: Sequence[s
         shares = np.zeros(len(law.numbers))
         shares[[law.numbers.index(name) for name in wider]] = tried
         own = law.model_copy(update={"widths": tuple(shares.tolist())})
-        width = np.maximum(own.width(found.numbers)[:, np.newaxis], _LEAST)
+        width = np.maximum(own.width(numbers)[:, np.newaxis], _LEAST)
         low, high = np.quantile(off / width, _ENDS, axis=0)
         ends = np.maximum(-low, _LEAST), np.maximum(high, _LEAST)
         reach = np.maximum(-off / (width * ends[0]), off / (width * ends[1]))
-        more = np.max([np.quantile(reach[family], _HELD, axis=0) for family in families], axis=0)
+        more = np.max([np.quantile(reach[one], _HELD, axis=0) for one in families], axis=0)
         wide = float((width * more * (ends[0] + ends[1])).mean())
         if wide < least:
             below, above = (_pair(more * end + 10.0**-_DIGITS) for end in ends)
@@ -193,6 +205,8 @@ class Recipe:
         gates: Share of each in the gate.
         wider: Numbers that make intervals wider.
         scenes_of: Yields the scenes of groups with the changes that the law is of.
+        less: Laws of echoes whose factors are taken off these changes first.
+        also: Families whose blasts it has as well, and which another law judges.
         hidden: Hidden units.
         decay: Penalty on weights.
     """
@@ -203,20 +217,30 @@ class Recipe:
     gates: Mapping[str, float]
     wider: tuple[str, ...] = ()
     scenes_of: Callable[[Iterable[Group]], Iterator[Bays]] = scenes_with_loads
+    less: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
     hidden: int = 8
     decay: float = 3e-4
 
-    def samples(self, groups: Iterable[Group], families: Collection[str] = ()) -> Samples:
-        """Return the samples of some groups, those of its families that are named, or of all."""
-        chosen = families or self.families
-        scenes = (bays for bays in self.scenes_of(groups) if bays.family in chosen)
-        return samples(scenes, self.numbers_of)
+    def samples(
+        self, groups: Iterable[Group], known: Mapping[str, Law], families: Collection[str] = ()
+    ) -> Samples:
+        """Return the samples of some groups, those of its families that are named, or of all.
 
-    def fitted(self, groups: Iterable[Group]) -> Law:
-        """Return the law of some groups."""
+        Args:
+            groups: The groups.
+            known: Laws by name, with those of `less`.
+            families: The families.
+        """
+        chosen = families or (*self.families, *self.also)
+        scenes = (bays for bays in self.scenes_of(groups) if bays.family in chosen)
+        return samples(less_echoes(scenes, [known[name] for name in self.less]), self.numbers_of)
+
+    def fitted(self, groups: Iterable[Group], known: Mapping[str, Law]) -> Law:
+        """Return the law of some groups, with other laws known."""
         gates = [self.gates.get(name, 0.0) for name in self.columns]
-        found = self.samples(groups)
-        return fit(found, self.columns, gates, self.wider, self.hidden, self.decay)
+        found = self.samples(groups, known)
+        return fit(found, self.families, self.columns, gates, self.wider, self.hidden, self.decay)
 
 
 _THIRD: Final = 1.0 / len(between.WIDTHS)
@@ -230,16 +254,8 @@ RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
             {"facing": 1.0},
             ("root_to_far_end", "bay_height", "charge_height"),
             impulses_in_the_open,
-            12,
-            1e-4,
-        ),
-        "between": Recipe(
-            ("wall", "posts", "rows", "raised"),
-            samples_between,
-            between.NUMBERS,
-            {name: _THIRD for name in between.NUMBERS if name.startswith("taken")},
-            ("root_thickness", "charge_height"),
             hidden=12,
+            decay=1e-4,
         ),
         "opposite": Recipe(
             ("opposite", "street"),
@@ -255,6 +271,25 @@ RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
             {"beside": 1.0},
             ("near_opposite", "near_beside"),
         ),
+        "between": Recipe(
+            ("wall", "posts", "rows", "raised", "far"),
+            samples_between,
+            between.NUMBERS,
+            {name: _THIRD for name in between.NUMBERS if name.startswith("taken")},
+            ("root_thickness", "charge_height"),
+            less=("opposite", "beside"),
+            also=("tee",),
+            hidden=20,
+            decay=1e-4,
+        ),
+        "attached": Recipe(
+            ("canopy",),
+            samples_attached,
+            attached.NUMBERS,
+            {"roofed": 1.0, "podium": 1.0},
+            ("roofed", "podium"),
+            hidden=12,
+        ),
         "shadow": Recipe(("shadow",), samples_shadow, shadow.NUMBERS, {"away": 1.0}),
     }
 )
@@ -262,5 +297,8 @@ RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
 
 
 def fit_all(groups: Sequence[Group], about: Mapping[str, str]) -> Laws:
-    """Return all laws."""
-    return Laws(**{name: own.fitted(groups) for name, own in RECIPES.items()}, about=dict(about))
+    """Return all laws, in the order of the recipes."""
+    found: dict[str, Law] = {}
+    for name, recipe in RECIPES.items():
+        found[name] = recipe.fitted(groups, found)
+    return Laws(**found, about=dict(about))

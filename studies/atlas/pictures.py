@@ -10,7 +10,7 @@ from blast_env.arrays import FloatArray
 from blast_env.atlas import Laws
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES
-from studies.atlas.samples import Bays, Group, away_from, samples, scenes_with_loads
+from studies.atlas.samples import Bays, Group, away_from, less_echoes, samples, scenes_with_loads
 from studies.atlas.samples import impulses_in_the_open as in_the_open
 
 if TYPE_CHECKING:
@@ -91,7 +91,8 @@ def _mean_factor(bays: Bays) -> float:
 
 def _by_law(axes: "Axes", name: str, scenes: Sequence[Bays], known: Laws) -> None:
     recipe = RECIPES[name]
-    own = samples(scenes, recipe.numbers_of)
+    laws = [getattr(known, law) for law in recipe.less]
+    own = samples(less_echoes(scenes, laws), recipe.numbers_of)
     found = getattr(known, name).factors(own.numbers)
     measured: FloatArray = np.exp(own.log_change[:, 0])
     says = found.middle[:, 0]

@@ -46,7 +46,7 @@ def rounds(names: Sequence[str], count: int) -> Iterator[tuple[str, int, bool]]:
 
 def run_group(name: str, number: int, fine: bool, folder: Path) -> int:
     """Run the blasts of a group unless its file exists; return the number of blasts run."""
-    path = folder / name / f"{number:04d}{'_fine' if fine else ''}.json"
+    path = _path(folder, name, number, fine)
     if path.exists():
         return 0
     make_folder(path.parent)
@@ -90,6 +90,25 @@ COLUMNS: Final = (
 _OF_LOADS: Final = ("bays", "middles", "normals", "impulse", "peak", "known", "seconds")
 
 
+def restore(table: pd.DataFrame, folder: Path) -> int:
+    """Write the groups of a table as files of a folder; return the number of blasts."""
+    count = 0
+    for engine in dict.fromkeys(table["engine"].tolist()):
+        for cells in (COARSE, FINE):
+            for group in groups_of(table[table["engine"] == engine], cells.cell_m):
+                path = _path(folder, group["family"], group["group"], cells is FINE)
+                if not path.exists():
+                    make_folder(path.parent)
+                    whole = {**group, "cell_m": cells.cell_m, "engine": engine}
+                    write_text(path, json.dumps(whole))
+                    count += len(group["scenes"])
+    return count
+
+
+def _path(folder: Path, name: str, number: int, fine: bool) -> Path:
+    return folder / name / f"{number:04d}{'_fine' if fine else ''}.json"
+
+
 def table_of_runs(folder: Path) -> tuple[pd.DataFrame, int]:
     """Return the table of a folder's blasts, and their number."""
     rows = []
@@ -111,15 +130,13 @@ def table_of_runs(folder: Path) -> tuple[pd.DataFrame, int]:
 def groups_of(table: pd.DataFrame, cell_m: float) -> Iterator[dict[str, Any]]:
     """Yield the groups of a table that were run on cells of a size."""
     chosen = table[table["cell_m"] == cell_m]
-    names = dict.fromkeys(zip(chosen["family"], chosen["group"].tolist(), strict=True))
-    for family, number in sorted(names):
-        own = chosen[(chosen["family"] == family) & (chosen["group"] == number)]
+    for (family, _), own in chosen.groupby(["family", "group"]):
         rows = own.sort_values("scene")
         scenes = [
             {**parse_json(boxes), **parse_json(loads)}
             for boxes, loads in zip(rows["boxes"], rows["loads"], strict=True)
         ]
-        yield {"family": family, "group": number, "scenes": scenes}
+        yield {"family": family, "group": int(rows["group"].iloc[0]), "scenes": scenes}
 
 
 def groups_in(folder: Path, fine: bool = False) -> Iterator[dict[str, Any]]:

@@ -1,16 +1,18 @@
 """Samples of the atlas: numbers and changed loads of bays, from the groups that were run."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.atlas.attached import numbers_of_attached
 from blast_env.atlas.between import numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
 from blast_env.atlas.edges import NUMBERS as EDGES
 from blast_env.atlas.edges import numbers_of_edges
+from blast_env.atlas.laws import Law
 from blast_env.atlas.shadow import numbers_of_shadow
 from blast_env.curves import Ways, in_the_open
 from studies.atlas.scenes import CUBE_ROOT, MODULES
@@ -193,30 +195,55 @@ def samples(scenes: Iterable[Bays], numbers_of: Numbers) -> Samples:
     )
 
 
-def row_between(bays: Bays) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the numbers of every row between, and the shares that it takes."""
-    rows = rows_between(bays.charge, bays.middles, bays.normals[0], bays.boxes)
-    return [(numbers_between(row, bays.charge), row.taken) for row in rows]
+def less_echoes(scenes: Iterable[Bays], laws: Sequence[Law]) -> Iterator[Bays]:
+    """Yield scenes with what is left of their changes apart from laws of echoes."""
+    if not laws:
+        yield from scenes
+        return
+    for bays in scenes:
+        found = fronts_of(bays)
+        echo = np.sum([np.log(law.factors(found).middle) for law in laws], axis=0)
+        yield replace(bays, log_change=bays.log_change - echo)
+
+
+def fronts_of(bays: Bays) -> FloatArray:
+    """Return the numbers of the echoes of all other boxes (bays, numbers)."""
+    return numbers_of_echoes(bays.charge, bays.middles, bays.normals[0], bays.boxes, bays.high)
+
+
+def row_between(bays: Bays) -> list[FloatArray]:
+    """Return the numbers of every row between."""
+    normal, fronts = bays.normals[0], fronts_of(bays)
+    return [
+        numbers_between(row, bays.charge, bays.middles, normal, bays.high, fronts)
+        for row in rows_between(bays.charge, bays.middles, normal, bays.boxes)
+    ]
 
 
 def samples_between(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of obstacles between, of scenes with one row."""
-    normal = bays.normals[0]
-    rows = rows_between(bays.charge, bays.middles, normal, bays.boxes)
+    rows = row_between(bays)
     if len(rows) != 1:
         return np.empty((len(bays.middles), 0)), np.zeros(len(bays.middles), dtype=bool)
-    found = numbers_between(rows[0], bays.charge)
-    return found, np.ones(len(found), dtype=bool)
+    return rows[0], np.ones(len(bays.middles), dtype=bool)
 
 
 def samples_echoes(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of echoes, of bays that no obstacle hides."""
     normal = bays.normals[0]
-    found = numbers_of_echoes(bays.charge, bays.middles, normal, bays.boxes, bays.high)
+    found = fronts_of(bays)
     hidden = np.zeros(len(found), dtype=bool)
     for row in rows_between(bays.charge, bays.middles, normal, bays.boxes):
         hidden |= row.taken[:, 0] > 0.5
     return found, ~hidden
+
+
+def samples_attached(bays: Bays) -> tuple[FloatArray, BoolArray]:
+    """Return the numbers of what adjoins a wall, of bays that it does not cover."""
+    normal, up = bays.normals[0], bays.middles[:, 2, np.newaxis]
+    found = numbers_of_attached(bays.charge, bays.middles, normal, bays.boxes, bays.high)
+    covered = (up >= bays.boxes[:, 4]) & (up <= bays.boxes[:, 5])
+    return found, np.asarray(~covered.any(axis=1))
 
 
 def samples_shadow(bays: Bays) -> tuple[FloatArray, BoolArray]:

@@ -12,7 +12,6 @@ from blast_env.arrays import FloatArray
 from blast_env.atlas import Laws
 from blast_env.documents import parse_json
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.engines.gas_validation import bay_middles
 from blast_env.evaluation.questions.screening import BayScreening, screen
 from blast_env.files import make_folder, write_text
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -21,7 +20,6 @@ from blast_env.layout import load_layout
 from blast_env.response.sdof import impulses
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import Charge
-from studies.atlas.clipping import Clipping
 
 SITES: Final = (
     *("clinic_front", "control_room", "guard_post", "hotel_forecourt", "ministry_kerb"),
@@ -29,8 +27,14 @@ SITES: Final = (
 )
 """Bundled sites with heights whose blast takes seconds."""
 
+CELL_M: Final = 0.25
+"""Side of the cells of gas dynamics on the others."""
+
+LARGE: Final = ("government_forecourt", "street_front")
+"""Large bundled sites, on cells that grow from 0.5 m."""
+
 _BEST: Final = Path("docs/data/best_found")
-_LEAST_CELLS: Final = 8.0  # per m/kg^(1/3)
+_ALONG: Final = 0.9  # cosine between normals of the same wall
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +45,10 @@ class SiteLoads:
         site: Name of the site.
         has_layout: Whether the best known layout stands on it.
         bays: The bays by screening with the atlas.
-        gas: Impulses and peaks by gas dynamics, peaks as sharp as those of the curves are to the
-            same cells on a wall in the open, at the bay's distance and angle (bays, 2).
+        gas: Impulses and peaks of the mean pressures by gas dynamics (bays, 2).
         without: Those by screening without the atlas.
         atlas: Those with it.
-        likely: Impulses by its best estimates (bays,).
+        likely: Those by its best estimates (bays, 2).
     """
 
     site: str
@@ -57,9 +60,7 @@ class SiteLoads:
     likely: FloatArray
 
 
-def on_site(
-    name: str, has_layout: bool, known: Laws, clipping: Clipping, folder: Path
-) -> Iterator[SiteLoads]:
+def on_site(name: str, has_layout: bool, known: Laws, folder: Path) -> Iterator[SiteLoads]:
     """Yield the loads on a site under each threat, at its worst place by screening without atlas.
 
     Blasts are kept in a folder.
@@ -72,8 +73,8 @@ def on_site(
         layout = tuple(load_layout(_BEST / f"{site.name}.json", site))
     for number, threat in enumerate(screen(site, layout).threats):
         path = folder / f"{name}_{'layout' if has_layout else 'alone'}_{number}.json"
-        by_gas = _by_gas(site, layout, threat.charge, clipping, path)
         own = _under(site, threat.charge)
+        by_gas = _by_gas(own, layout, path)
         before, after = (screen(own, layout, (), atlas).threats[0] for atlas in (None, known))
         least_m = CHECKED_SCALED_DISTANCE[0] * float(np.cbrt(threat.charge.tnt_kg))
         chosen = [
@@ -89,41 +90,53 @@ def on_site(
                 np.array([by_gas[bay.filled.bay.name] for bay, _ in chosen]),
                 np.array([(bay.impulse_pa_s, bay.peak_pa) for _, bay in chosen]),
                 np.array([(bay.impulse_pa_s, bay.peak_pa) for bay, _ in chosen]),
-                np.array([bay.likely_pa_s for bay, _ in chosen]),
+                np.array([(bay.likely_pa_s, bay.likely_peak_pa) for bay, _ in chosen]),
             )
 
 
-def _by_gas(
-    site: Scenario, layout: Layout, charge: Charge, clipping: Clipping, path: Path
-) -> Mapping[str, tuple[float, float]]:
-    """Return impulse and peak of each bay by gas dynamics, from a file if it exists."""
-    scale = float(np.cbrt(charge.tnt_kg))
-    cell_m = _cell_m(scale)
+def _by_gas(site: Scenario, layout: Layout, path: Path) -> Mapping[str, tuple[float, float]]:
+    """Return impulse and peak of each bay by gas dynamics, from a file if it exists.
+
+    Cells clip peaks, more so near the charge, and a slanting wave crosses a bay in time. So a peak
+    is the curves' for the building alone in the open, times what gas has on the same cells with all
+    that stands around over without it.
+    """
     if not path.exists():
-        loads = GasBlast(site, layout, 0, GasEngine(cell_m=cell_m), charge).run().bay_loads
-        time_s, pressure_pa = loads.histories
-        peaks = pressure_pa.max(axis=1).tolist()
-        rows = zip(impulses(time_s, pressure_pa).max(axis=1).tolist(), peaks, strict=True)
-        names = [bay.bay.name for bay in loads.bays]
+        found, loads = {}, _loads(site, layout)
+        for structure in {bay.split("/")[0] for bay in loads}:
+            alone = _alone(site, structure)
+            is_alone = not layout and len(site.structures) == 1
+            in_the_open = loads if is_alone else _loads(alone, ())
+            (threat,) = screen(alone, (), (), None).threats
+            for bay in threat.bays:
+                name = bay.filled.bay.name
+                if name in loads:
+                    impulse, peak = loads[name]
+                    clipped = bay.peak_pa / in_the_open[name][1] if bay.in_sight else 1.0
+                    found[name] = (impulse, peak * clipped)
         make_folder(path.parent)
-        write_text(path, json.dumps(dict(zip(names, rows, strict=True))))
-    found: dict[str, tuple[float, float]] = parse_json(path.read_text("utf-8"))
-    bays = [own.bay for own in site.bays_with(layout) if own.bay.name in found]
-    rectangles_m = {structure.name: structure.rectangle_m for structure in site.structures}
-    middles_m, normals = bay_middles(rectangles_m, bays)
-    way_m = np.array([*charge.position_m, charge.height_m]) - middles_m
-    away_m = np.linalg.norm(way_m, axis=1)
-    cosine = (way_m * normals).sum(axis=1) / away_m
-    sharper = clipping.sharpening(scale / cell_m, away_m / scale, cosine)
-    return {
-        bay.name: (found[bay.name][0], found[bay.name][1] * factor)
-        for bay, factor in zip(bays, sharper.tolist(), strict=True)
-    }
+        write_text(path, json.dumps(found))
+    rows: dict[str, tuple[float, float]] = parse_json(path.read_text("utf-8"))
+    return rows
 
 
-def _cell_m(scale: float) -> float:
-    """Return the side of the cells for a cube root of the mass."""
-    return 0.5 if scale / 0.5 >= _LEAST_CELLS else 0.25
+def _loads(scenario: Scenario, layout: Layout) -> dict[str, tuple[float, float]]:
+    """Return the impulse of each bay, and the peak of its mean pressure, on the cells."""
+    is_large = scenario.name in LARGE
+    engine = GasEngine(cells="coarse") if is_large else GasEngine(cell_m=CELL_M)
+    result = GasBlast(scenario, layout, engine=engine).run()
+    time_s, pressure_pa = result.bay_loads.histories
+    loads = zip(impulses(time_s, pressure_pa).max(axis=1), pressure_pa.max(axis=1), strict=True)
+    names = [own.bay.name for own in result.bay_loads.bays]
+    rows = ((float(impulse), float(peak)) for impulse, peak in loads)
+    return dict(zip(names, rows, strict=True))
+
+
+def _alone(site: Scenario, structure: str) -> Scenario:
+    """Return a site with one building alone."""
+    document: dict[str, Any] = site.model_dump(mode="json", exclude_none=True)
+    kept = [own for own in document["structures"] if own["name"] == structure]
+    return Scenario.from_document({**document, "structures": kept}, site.name)
 
 
 def _under(site: Scenario, charge: Charge) -> Scenario:

@@ -28,11 +28,14 @@ def wall(high: float, at: float = 0.7, long: float = 4.0, thick: float = 0.1) ->
     return np.array([[at, -0.5 * long, at + thick, 0.5 * long, 0.0, high]])
 
 
-def behind(boxes: FloatArray) -> Factors:
-    found = Factors.none(len(BAYS))
-    for row in rows_between(CHARGE, BAYS, TOWARDS, boxes):
-        own = packaged_laws().between.factors(numbers_between(row, CHARGE))
-        found = found.least(own.where_known())
+def behind(boxes: FloatArray, charge: FloatArray = CHARGE, bays: FloatArray = BAYS) -> Factors:
+    """Return what the rows of some boxes do, in and out of range."""
+    high = np.full(len(bays), 1.3)
+    fronts = numbers_of_echoes(charge, bays, TOWARDS, boxes, high)
+    found = Factors.none(len(bays))
+    for row in rows_between(charge, bays, TOWARDS, boxes):
+        numbers = numbers_between(row, charge, bays, TOWARDS, high, fronts)
+        found = found.least(packaged_laws().between.factors(numbers).where_known())
     return found
 
 
@@ -53,7 +56,7 @@ def test_without_an_obstacle_the_factor_is_exactly_one() -> None:
 def test_a_vanishing_wall_does_nothing() -> None:
     found = behind(wall(0.001))
     assert found.middle == pytest.approx(1.0, abs=0.01)
-    assert (found.high - found.low).max() < 0.06
+    assert (found.high - found.low).max() < 0.05
 
 
 @given(st.floats(0.05, 1.4), st.floats(0.5, 4.0), st.floats(0.01, 0.5))
@@ -90,10 +93,9 @@ def test_intervals_hold_the_estimate_and_the_counted_load_is_on_the_safe_side() 
 
 def test_outside_its_range_the_law_takes_nothing_off() -> None:
     raised = np.array([0.0, 0.0, 4.0])
-    (row,) = rows_between(raised, BAYS, TOWARDS, wall(6.0))
-    own = packaged_laws().between.factors(numbers_between(row, raised))
-    assert not own.in_range.any()
-    assert (own.where_known().middle == 1.0).all()
+    found = behind(wall(6.0), raised)
+    assert not found.in_range.any()
+    assert (found.middle == 1.0).all()
 
 
 @pytest.mark.parametrize(("law", "boxes"), [
@@ -112,9 +114,14 @@ def test_fronts_throw_waves_back(law: str, boxes: list[list[float]]) -> None:
 
 
 def test_the_errors_of_the_fit_are_in_the_file() -> None:
-    for law in (packaged_laws().between, packaged_laws().opposite, packaged_laws().shadow):
-        for family in law.families.values():
-            assert family.error[0] < 0.6 * family.before[0]
+    """Each law explains most of what its families do; walls far away do hardly anything."""
+    laws = packaged_laws()
+    for law in (laws.between, laws.opposite, laws.shadow, laws.attached):
+        for name, family in law.families.items():
+            if name == "far":
+                assert max(family.before[0], family.error[0]) < 0.1
+            else:
+                assert family.error[0] < 0.6 * family.before[0]
 
 
 def house(with_wall: bool) -> Scenario:
@@ -141,8 +148,7 @@ def test_a_wall_by_gas_lies_in_the_interval_of_the_law() -> None:
     scale = 100.0 ** (1 / 3)
     bays = np.array([[10.0, y, z] for y in (-4.5, -1.5, 1.5, 4.5) for z in (1.5, 4.5)]) / scale
     box = np.array([[3.0, -10.0, 3.5, 10.0, 0.0, 3.0]]) / scale
-    (row,) = rows_between(CHARGE, bays, TOWARDS, box)
-    found = packaged_laws().between.factors(numbers_between(row, CHARGE))
+    found = behind(box, bays=bays)
     low, high = (float(part[:, 0].mean()) for part in (found.low, found.high))
     assert low < behind_it / alone < high
     assert high / low < 2.0
