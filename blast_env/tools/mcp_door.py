@@ -9,7 +9,7 @@ from typing import Any
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.provenance import package_version
-from blast_env.tools.sessions import SESSION_TOOLS, Sessions
+from blast_env.tools.sessions import MOST_SESSIONS, SESSION_TOOLS, Sessions
 from blast_env.tools.table import call_tool
 
 with import_extra("mcp", "tools by MCP"):
@@ -22,12 +22,13 @@ with import_extra("mcp", "tools by MCP"):
 
 def mcp_server(sessions: Sessions) -> Server[Any]:
     """Return the server of some sessions."""
+    limiter = anyio.CapacityLimiter(2 * MOST_SESSIONS)  # many calls may wait for blasts
     return Server(
         "blast-env",
         version=package_version(),
         instructions="Call `look` first: it has the task.",
         on_list_tools=_list_tools,
-        on_call_tool=partial(_call_tool, sessions),
+        on_call_tool=partial(_call_tool, sessions, limiter),
     )
 
 
@@ -57,12 +58,15 @@ async def _list_tools(
 
 
 async def _call_tool(
-    sessions: Sessions, _: ServerRequestContext, params: types.CallToolRequestParams
+    sessions: Sessions,
+    limiter: anyio.CapacityLimiter,
+    _: ServerRequestContext,
+    params: types.CallToolRequestParams,
 ) -> types.CallToolResult:
     work = partial(call_tool, sessions, params.name, params.arguments or {}, SESSION_TOOLS)
     try:
         # Work of a call that is given up goes on: its result is free when it is asked for again.
-        found = await anyio.to_thread.run_sync(work, abandon_on_cancel=True)
+        found = await anyio.to_thread.run_sync(work, abandon_on_cancel=True, limiter=limiter)
     except BlastEnvError as error:
         return types.CallToolResult(content=[types.TextContent(text=str(error))], is_error=True)
     pictures = []

@@ -38,11 +38,9 @@ class ToolEnvironment(TaskLists, Environment[ToolCall, ToolAnswer, State]):
     SUPPORTS_CONCURRENT_SESSIONS = True
 
     def __init__(self, tasks: Tasks | None = None) -> None:
-        """Take the problems; unless given, those of the secret in `BLAST_ENV_SECRET`."""
-        tasks = Tasks(environ.get("BLAST_ENV_SECRET", "")) if tasks is None else tasks
-        TaskLists.__init__(self, tasks)
+        TaskLists.__init__(self, tasks or Tasks(environ.get("BLAST_ENV_SECRET", "")))
         Environment.__init__(self)
-        self._episodes = Episodes(tasks)
+        self._episodes = Episodes(self._tasks)
         self._episode_id: str | None = None
 
     def reset(

@@ -19,7 +19,8 @@ from mcp.client.streamable_http import streamable_http_client
 from blast_env.tools import TOOLS, Episode, Sessions
 from blast_env.tools.mcp_door import mcp_server
 from blast_env.tools.scripts import played_in, rules_guesses_blasts
-from tests.tools.row_session import BEST, session, walls
+from blast_env.tools.sessions import MOST_SESSIONS
+from tests.tools.row_session import BEST, HeldEngine, session, walls
 from tests.tools.serving import ENVIRONMENT, served
 
 
@@ -93,6 +94,30 @@ def test_full_zero_malformed_and_reseeded() -> None:
                 assert words in refused.content[0].text
             picture = await client.call_tool("look", {"picture": True})
             assert [block.type for block in picture.content] == ["text", "image"]
+
+    within(work)
+
+
+def test_calls_that_wait_leave_room_for_others() -> None:
+    """A client may have as many sessions as are kept, each with a blast that takes long."""
+    engine = HeldEngine()
+    many = Sessions(
+        lambda episode: session(episode.seed, episode.budget, engine=engine), Episode(budget=3)
+    )
+
+    async def work() -> None:
+        async with mcp.Client(mcp_server(many)) as client:
+            names = [(await values(client, "begin"))["session"] for _ in range(MOST_SESSIONS - 1)]
+            async with anyio.create_task_group() as waiting:
+                for name in names:
+                    blast = {"layout": walls(*BEST), "session": name}
+                    waiting.start_soon(client.call_tool, "blast", blast)
+                await anyio.sleep(0.5)
+                try:
+                    with anyio.fail_after(10.0):
+                        await values(client, "look")
+                finally:
+                    engine.go.set()
 
     within(work)
 
