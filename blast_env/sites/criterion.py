@@ -111,9 +111,12 @@ class Visibility:
             share = np.tile(np.minimum(entry_m[free] / protected_m[free], 1.0), TARGETS)
             over &= (share == 1.0) | (ends_m == 0.0) | (share * ends_m >= high_m)
         open_share *= float(weight[over].sum() / max(weight.sum(), 1e-300))
-        height_m = ends_m[:, np.newaxis, np.newaxis] * np.tile(along_share, (TARGETS, 1, 1))
+        height_m = (ends_m.reshape(TARGETS, -1, 1, 1) * along_share).reshape(-1, *cut.shape[1:])
         height_m -= LayoutState.empty(scenario).ground_m
-        return cls(weight[over], np.tile(cut, (TARGETS, 1, 1))[over], height_m[over], open_share)
+        cut = np.tile(cut, (TARGETS, 1, 1))
+        if over.all():  # the usual case, without copies
+            return cls(weight, cut, height_m, open_share)
+        return cls(weight[over], cut[over], height_m[over], open_share)
 
     def cut_by(self, height_m: float | None) -> BoolArray:
         """Return whether a module on each cell would cut each line (lines, rows, columns).

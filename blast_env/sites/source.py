@@ -144,7 +144,7 @@ class SiteSource:
 
 @lru_cache(maxsize=512)
 def _site(seed: int, ranges: Ranges) -> Scenario:
-    """Return a site; training draws the same few hundred again and again, at a quarter second."""
+    """Return a site; training draws the same few hundred again, at longer than an episode."""
     return generate_site(seed, ranges)
 
 
