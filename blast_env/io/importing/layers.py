@@ -2,6 +2,7 @@
 
 import glob
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -53,10 +54,10 @@ def read_layers(site_map: SiteMap) -> None:
     _check_companions(path)
     with import_extra("gis", "geographic data"):
         import pyogrio
-    with errors_of("pyogrio", path, "geographic data"):
+    with _errors_of_gdal(path):
         names = [str(name) for name, *_ in pyogrio.list_layers(path)]
     for name in names:
-        with errors_of("pyogrio", path, "geographic data"):
+        with _errors_of_gdal(path):
             count = int(pyogrio.read_info(path, layer=name, force_feature_count=True)["features"])
             check_count(path, count, MOST_FEATURES, "outlines and lines")
             meta, _, geometries, columns = pyogrio.raw.read(path, layer=name, force_2d=True)
@@ -68,6 +69,16 @@ def read_layers(site_map: SiteMap) -> None:
     if site_map.features:
         crs = _system(site_map, systems)
         site_map.crs = None if crs == LOCAL else crs
+
+
+@contextmanager
+def _errors_of_gdal(path: Path) -> Iterator[None]:
+    """Convert errors of pyogrio, without the advice on GDAL's drivers, which nobody here names."""
+    try:
+        with errors_of("pyogrio", path, "geographic data"):
+            yield
+    except BlastEnvError as error:
+        raise BlastEnvError(str(error).partition("; It might help")[0]) from error
 
 
 def _check_companions(path: Path) -> None:

@@ -200,5 +200,6 @@ def test_what_is_no_such_file_is_a_plain_error(suffix: str, tmp_path: Path) -> N
     path.write_bytes(b"this is no map")
     for beside in (".dbf", ".shx"):
         path.with_suffix(beside).touch()
-    with pytest.raises(BlastEnvError, match="cannot be read as"):
+    with pytest.raises(BlastEnvError, match="cannot be read as") as caught:
         import_site(path)
+    assert "DRIVER" not in str(caught.value)
