@@ -208,6 +208,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
+    "blast-env judge --method surrogate --method studies.benchmark.methods:surrogate_alone"
+    " --cell 0.5 --cache blasts --out entry": "--problem control_room-known-v2 --budget 2",
     "blast-env judge --method own_optimiser:climb --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),

@@ -31,7 +31,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.layout import LayoutState
+from blast_env.layout import LayoutState, draw_threat
 from blast_env.site import AnyCharge, Charge, Scenario, load_scenario
 from blast_env.surrogate import (
     ABOVE_M,
@@ -537,6 +537,19 @@ def test_of_what_rules_and_an_agent_propose_it_takes_what_the_surrogate_likes_be
     assert SurrogateSearch(surrogate, Better(), changes=0).at_once(YARD, charge) == best
     changed = SurrogateSearch(surrogate, Better(), changes=16).at_once(YARD, charge)
     assert guesses.loads([changed]) <= guesses.loads([best])
+
+
+def test_where_the_response_counts_no_agent_is_asked() -> None:
+    class Unasked(Drawing):
+        def propose(self, *_: object) -> Layout:
+            raise AssertionError
+
+    site = load_scenario("guard_post")
+    alone, beside = (
+        SurrogateSearch(by_hand(), agent, changes=0).at_once(site, draw_threat(site, 0))
+        for agent in (None, Unasked())
+    )
+    assert alone == beside
 
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:

@@ -137,7 +137,8 @@ class SurrogateSearch(Search):
 
     With blasts, a surrogate selects the layouts to simulate: first the agent's layout, then in
     turn the rules' layouts and the best of a search by predictions alone, then changes of the best
-    simulated layouts, one out of many at a time. The selection uses predictions corrected by the
+    simulated layouts, one out of many at a time. Where the response of facades counts, the agent is
+    left out. The selection uses predictions corrected by the
     errors on similar layouts (`Correction`). Against a hidden charge, layouts are simulated for a
     few places only. The prediction under all places, times the ratio of simulated to predicted
     load under those few, estimates a layout better than its simulated loads alone: it selects the
@@ -219,9 +220,10 @@ class SurrogateSearch(Search):
         guesses = Guesses.of(self.surrogate, case_for(scenario, charge))
         tell(0.5 * _SITE_SHARE)
         begin_with = [(), *layouts_by_rule(scenario, charge).values()]
-        if self.agent is not None:
-            drawn = self.agent.sample(scenario, charge, self.ranked, 0)
-            begin_with += [self.agent.propose(scenario, charge), *drawn]
+        agent = self._agent_beside(scenario)
+        if agent is not None:
+            drawn = agent.sample(scenario, charge, self.ranked, 0)
+            begin_with += [agent.propose(scenario, charge), *drawn]
 
         def go_on(share: float) -> None:
             tell(_SITE_SHARE + (1.0 - _SITE_SHARE) * share)
@@ -268,16 +270,25 @@ class SurrogateSearch(Search):
             best = session.ranked(plan.threats)[:_KEPT]
             session.assess([moves.near_best(best, session.rng)])
 
+    def _agent_beside(self, scenario: Scenario) -> SamplingAgent | None:
+        """Return the agent that a search by guesses begins with; none where the response counts.
+
+        A response comes in steps. Guesses hardly tell an agent's layouts apart there, which then
+        take the blasts of the rules'.
+        """
+        return None if scenario.objective.is_response else self.agent
+
     def _explore_by_guesses(self, session: SearchSession, estimates: "_Estimates") -> None:
         """Simulate the layouts with the best predictions, then changes of the best."""
         scenario, known_charge = session.problem.scenario, session.problem.known_charge
         guesses = estimates.everywhere
         rules = layouts_by_rule(scenario, known_charge).values()
         proposed: list[Layout] = []
-        if self.agent is not None:
+        agent = self._agent_beside(scenario)
+        if agent is not None:
             # 1. The agent's layout and samples, if there is one.
-            drawn = self.agent.sample(scenario, known_charge, self.agent_draws, session.seed)
-            proposed = [self.agent.propose(scenario, known_charge), *drawn]
+            drawn = agent.sample(scenario, known_charge, self.agent_draws, session.seed)
+            proposed = [agent.propose(scenario, known_charge), *drawn]
         session.assess(proposed[:1])
         # 2. A search by predictions alone, from no barrier, the rules' and the agent's layouts.
         found = improved(guesses, [(), *rules, *proposed], self.guesses, session.rng)
