@@ -219,6 +219,12 @@ SMALLER: Final[dict[str, str]] = {
     " --method rules --method agent --method surrogate --out out/entry": (
         "--cases 1 --budget 0 --cell 0.5"
     ),
+    "blast-env judge --scenario item_sites --scenario kerb_sites --cases 3 --budget 0 --budget 10"
+    " --cell 0.5 --method rules --method agent --method surrogate --out out/entry": (
+        "--cases 1 --budget 0"
+    ),
+    "blast-env judge --scenario headroom_sites --cases 4 --budget 0 --budget 10 --cell 0.5"
+    " --method rules --method agent --method surrogate --out out/entry": "--cases 1 --budget 0",
     "blast-env judge entry/genetic.json --cache blasts --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers
