@@ -259,7 +259,7 @@ def main(
 ) -> None:
     """Train, and judge on held-out threats: a line for each method, then a row for each site."""
     torch.set_num_threads(1)
-    rows = []
+    rows, gas = [], find_engine("gas")
     for site in scenario or ["courtyard"]:
         setting = Setting(site, engine, reward, action)
         agents: dict[str, Agent] = {}
@@ -268,13 +268,12 @@ def main(
                 began_s = process_time()
                 agent = trained(kind, setting, steps, seed)
                 agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
-        found = [judged(setting, setting.training, agents, HELD_OUT[:threats])]
-        if by_gas:
-            found.append(judged(setting, find_engine("gas"), agents, HELD_OUT[:by_gas], cache))
-        for judgement in found:
-            for line in judgement.lines():
-                print_line(line)
-            rows.append(judgement.row())
+        for judge, count, kept in ((setting.training, threats, None), (gas, by_gas, cache)):
+            if count:
+                judgement = judged(setting, judge, agents, HELD_OUT[:count], kept)
+                for line in judgement.lines():
+                    print_line(line)
+                rows.append(judgement.row())
     print_table("reduction, %", HEADERS, rows, 2)
 
 
