@@ -37,6 +37,10 @@ DATA = Path("docs/data")
 _MOST = 50_000  # blasts in memory
 _CLOSE = 0.03
 """Share of the load within which a rule may become the best one with finer cells."""
+_HEADROOM = 0.05
+"""Share of the load that a find takes off beyond the best rule."""
+WITHOUT_GUESSES = ("botorch_turbo", "genetic", "optuna_tpe", "population_annealing", "random")
+"""Methods that know of a layout only what its blast says."""
 
 
 def named_definition(name: str) -> Definition:
@@ -198,3 +202,19 @@ def mean_curve(runs: Sequence[Run], rules: Mapping[str, float], blasts: IntArray
         points.append(100.0 * (rules[run.problem] - by_then))
     mean: FloatArray = np.mean(points, axis=0)
     return mean
+
+
+def finders(problem: str, submissions: Iterable[SubmissionJudgement]) -> tuple[str, ...]:
+    """Return the methods with a run that takes off 5 points more than the best rule.
+
+    Runs with blasts count, by the judge's cells. Sites that the guesses of one method chose favour
+    it; headroom that several methods find by blasts does not rest on them.
+    """
+    return tuple(
+        submission.method
+        for submission in submissions
+        if any(
+            run.problem == problem and run.budget > 0 and run.rule - run.share >= _HEADROOM
+            for run in submission.runs
+        )
+    )
