@@ -22,7 +22,7 @@ from blast_env.site.blast_site import BlastSite
 _NOTICED: Final = 0.02
 """Change of a load from which surroundings have a name in the answer."""
 
-_AT_ONCE: Final = 200_000
+_AT_ONCE: Final = 1_000_000
 """Pairs of bays and boxes that are looked at together."""
 
 BARRIER: Final = "barrier"
