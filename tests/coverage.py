@@ -1,9 +1,11 @@
 """Run the tests and measure what they reach of the package: `python -m tests.coverage`.
 
-Arguments are those of pytest. What was reached is printed by room. Not measured are files of
-compiled functions, whose bytecode must stay as it is, and what runs in processes of their own.
+Arguments are those of pytest, and `--least`, a share of branches in percent: to reach less is a
+failure. What was reached is printed by room. Not measured are files of compiled functions, whose
+bytecode must stay as it is, and what runs in processes of their own.
 """
 
+import argparse
 import json
 import re
 import subprocess
@@ -16,7 +18,9 @@ from typing import Any, Final
 ROOT: Final = Path(__file__).parents[1]
 PACKAGE: Final = "blast_env"
 
-_COMPILES: Final = re.compile("^from (numba|llvmlite)", re.MULTILINE)
+_COMPILES: Final = re.compile(
+    r"^from (numba|llvmlite)|^from blast_env\.compilation import .*\bcompiled\b", re.MULTILINE
+)
 _COUNTS: Final = ("covered_lines", "missing_lines", "covered_branches", "missing_branches")
 
 
@@ -62,17 +66,24 @@ def table(rooms: Mapping[str, Counter[str]]) -> Iterable[str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run pytest, print what it reached, and return its exit code."""
+    """Run pytest, print what it reached, and return its exit code, or 1 if that is too little."""
+    parser = argparse.ArgumentParser(allow_abbrev=False)
+    parser.add_argument("--least", type=float, default=0.0)
+    options, for_pytest = parser.parse_known_args(arguments)
     out = ROOT / "out" / "coverage.json"
     out.parent.mkdir(exist_ok=True)
     out.unlink(missing_ok=True)
     omit = ",".join(compiled_files(ROOT / PACKAGE))
     measured = ["slipcover", "--branch", "--source", PACKAGE, "--omit", omit, "--json"]
     python = [sys.executable, "-W", "ignore:Unable to activate pytest branch coverage"]
-    command = [*python, "-m", *measured, "--out", str(out), "-m", "pytest", *arguments]
+    command = [*python, "-m", *measured, "--out", str(out), "-m", "pytest", *for_pytest]
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
-    print(*table(by_room(json.loads(out.read_text(encoding="utf-8"))["files"])), sep="\n")
-    return code
+    rooms = by_room(json.loads(out.read_text(encoding="utf-8"))["files"])
+    print(*table(rooms), sep="\n")
+    reached = percent(rooms[PACKAGE]["covered_branches"], rooms[PACKAGE]["missing_branches"])
+    if reached < options.least:
+        print(f"branches reached: {reached:.1f} %, must be at least {options.least:g} %")
+    return code or int(reached < options.least)
 
 
 if __name__ == "__main__":

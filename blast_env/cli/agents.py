@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from blast_env.design.search import Proposer, SurrogateSearch
+from blast_env.design.search import Proposer
 from blast_env.errors import MissingExtraError, import_extra
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # compiled code, which takes half a second to import
+    from blast_env.design.search import SurrogateSearch
     from blast_env.surrogate import Surrogate
 
 AGENT: Final = "agent"
@@ -35,7 +36,7 @@ def agent_without_blasts() -> tuple[Proposer, Digests]:
     }
 
 
-def surrogate_search(surrogate: "Surrogate") -> tuple[SurrogateSearch, Digests]:
+def surrogate_search(surrogate: "Surrogate") -> "tuple[SurrogateSearch, Digests]":
     """Return the search by a surrogate, from the layouts of the packaged agent.
 
     Without the extra `agents` it begins with the rules' layouts alone, as in Python.
