@@ -61,11 +61,14 @@ def serve(
     if mcp == openenv:
         raise BlastEnvError("choose one door: --mcp or --openenv")
     if openenv:
+        tasks.prepare()
         _serve_openenv(tasks, port)
     else:
         tasks.problem(split, index)  # refuses one that does not exist, before a client comes
         asked = {"split": split, "index": index, "seed": seed, "budget": budget}
         first = Episode.model_validate(asked)
+        if http:
+            tasks.prepare()  # a client on the standard input waits for its first answer from now on
         _serve_mcp(Sessions(tasks.begin, first), port if http else None)
 
 

@@ -1,5 +1,6 @@
 """The door by OpenEnv: an episode of the tools as an environment, by HTTP and websockets."""
 
+from functools import partial
 from os import environ
 from typing import Any
 
@@ -71,11 +72,8 @@ class ToolEnvironment(TaskLists, Environment[ToolCall, ToolAnswer, State]):
 
 def openenv_app(tasks: Tasks) -> FastAPI:
     """Return the server of some problems, without a guard."""
+    make = partial(ToolEnvironment, tasks)
     app: FastAPI = create_app(
-        lambda: ToolEnvironment(tasks),
-        ToolCall,
-        ToolAnswer,
-        env_name=NAME,
-        max_concurrent_envs=MOST_EPISODES,
+        make, ToolCall, ToolAnswer, env_name=NAME, max_concurrent_envs=MOST_EPISODES
     )
     return app

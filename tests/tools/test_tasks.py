@@ -2,9 +2,10 @@
 
 import pytest
 
-from blast_env.benchmark import DEFINITIONS
+from blast_env.benchmark import DEFINITIONS, Definition
 from blast_env.errors import BlastEnvError
-from blast_env.tools import Episodes, TaskLists, Tasks
+from blast_env.tools import Episodes, Session, TaskLists, Tasks
+from blast_env.tools.records import BUDGET
 from tests.tools.row_session import BEST, session, walls
 
 SECRET = "correct horse"
@@ -79,3 +80,15 @@ def test_rewards_of_an_episode_sum_to_its_score() -> None:
     assert [bool(turn.error) for turn in turns] == [True, False, False, True]
     assert episodes.steps == 4
     episodes.close()
+
+
+def test_to_prepare_looks_at_a_site_with_a_vehicle_and_spends_nothing() -> None:
+    begun: list[Session] = []
+
+    def kept(definition: Definition, seed: int, budget: int) -> Session:
+        begun.append(Session(definition, seed, budget))
+        return begun[-1]
+
+    Tasks(session=kept).prepare()
+    assert ["vehicle" in own.problem_name for own in begun] == [True]
+    assert begun[0].look().blasts_left == BUDGET
