@@ -31,7 +31,7 @@ CELL_M: Final = 0.25
 """Side of the cells of gas dynamics on the others."""
 
 LARGE: Final = ("government_forecourt", "street_front")
-"""Large bundled sites, on cells that grow from 0.5 m."""
+"""Large bundled sites, on cells that grow from 0.25 m."""
 
 _BEST: Final = Path("docs/data/best_found")
 _ALONG: Final = 0.9  # cosine between normals of the same wall
@@ -123,7 +123,7 @@ def _by_gas(site: Scenario, layout: Layout, path: Path) -> Mapping[str, tuple[fl
 def _loads(scenario: Scenario, layout: Layout) -> dict[str, tuple[float, float]]:
     """Return the impulse of each bay, and the peak of its mean pressure, on the cells."""
     is_large = scenario.name in LARGE
-    engine = GasEngine(cells="coarse") if is_large else GasEngine(cell_m=CELL_M)
+    engine = GasEngine(cells="fine") if is_large else GasEngine(cell_m=CELL_M)
     result = GasBlast(scenario, layout, engine=engine).run()
     time_s, pressure_pa = result.bay_loads.histories
     loads = zip(impulses(time_s, pressure_pa).max(axis=1), pressure_pa.max(axis=1), strict=True)
