@@ -25,6 +25,8 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import Reward
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
+from blast_env.layout import charge_against
+from blast_env.site import AnyCharge, Charge, Scenario, VehicleCharge, VehicleSource
 from blast_env.statistics import mean_estimate
 
 HELD_OUT: Final = range(10_000, 10_048)
@@ -127,6 +129,17 @@ def reductions(env: BlastBarrierEnv, agent: Agent | int | None, seeds: Sequence[
     return np.array(found)
 
 
+def _known(scenario: Scenario, charge: Charge) -> AnyCharge:
+    """Return a charge as rules know it: a vehicle goes to the worst place that a layout leaves."""
+    for source in scenario.charge:
+        if isinstance(source, VehicleSource):
+            for rank in range(source.places):
+                vehicle = VehicleCharge(source, rank)
+                if charge_against(scenario, (), vehicle) == charge:
+                    return vehicle
+    return charge
+
+
 def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, FloatArray]]:
     """Yield each rule with its reduction in each held-out episode."""
     found: dict[str, list[float]] = {}
@@ -134,7 +147,7 @@ def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, 
         env.reset(seed=seed)
         scenario, finish = env.placement.scenario, env.placement.catalogue.finish
         (charge,) = env.step(finish)[-1]["charges"]
-        for name, layout in layouts_by_rule(scenario, charge).items():
+        for name, layout in layouts_by_rule(scenario, _known(scenario, charge)).items():
             env.reset(seed=seed, options={"layout": layout})
             *_, info = env.step(finish)
             found.setdefault(name, []).append(info["reduction"])

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.units import PA_PER_PSI
 from studies.causes import Deposit, heaped, repeated, settings
-from studies.first_hour import Judgement, Setting
+from studies.first_hour import Judgement, Setting, by_rules
 from tests.evaluation.engines.shade import ShadeEngine
 
 FLAT = Setting("courtyard", action="place")
@@ -56,3 +56,10 @@ def test_a_row_of_the_table_has_leads_over_random_and_over_the_best_rule() -> No
         *("25.0 (20.0 to 30.0)", "+25.0"),
         *("30.0", "", ""),
     )
+
+
+def test_rules_know_a_vehicle_that_goes_to_the_worst_place_left() -> None:
+    """Against a charge that stays 1 m before the hotel, walls across the drive place nothing."""
+    env = Setting("hotel_forecourt", action="place").environment(ShadeEngine())
+    rules = dict(by_rules(env, range(2)))
+    assert rules["wall in the middle"].min() > 0.0
