@@ -211,7 +211,7 @@ SMALLER: Final[dict[str, str]] = {
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge --method surrogate --method studies.benchmark.methods:surrogate_alone"
-    " --cell 0.5 --cache blasts --out entry": "--problem control_room-known-v2 --budget 2",
+    " --cache blasts --out entry": "--problem control_room-known-v2 --budget 2 --cell 0.5",
     "blast-env judge --method own_optimiser:climb --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
