@@ -130,7 +130,7 @@ def judge(
             definitions = _definitions(problem, secret, sites, scenario or (), threat, cases)
             played = [
                 judging.played(*item, definitions)
-                for item in _methods(method, run, budget, definitions)
+                for item in _methods(method, run, tuple(dict.fromkeys(budget)), definitions)
             ]
             references = stored_references()
             if secret is not None or scenario:

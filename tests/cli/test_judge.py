@@ -66,7 +66,9 @@ def test_an_agent_of_visible_charges_gets_each_charge_as_a_problem(
 
 
 def test_generated_sites_are_held_out_from_training(tmp_path: Path) -> None:
-    found = judged_agent(tmp_path, Path("sites"), "--cases", 2)
+    """A budget that is given twice counts once."""
+    found = judged_agent(tmp_path, Path("sites"), "--cases", 2, "--budget", 0)
+    assert len(found.runs) == 2
     problems = {site_problem.name: site_problem for site_problem in site_problems("sites", 2)}
     assert [*found.problems] == [*problems]
     for played in found.runs:
