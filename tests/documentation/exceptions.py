@@ -136,11 +136,9 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.first_hour --reward relative --action row": (
         "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0"
     ),
-    "python -m studies.first_hour --engine surrogate --algorithm PPO --seeds 1 --threats 24"
-    " --by-gas 6 --scenario courtyard --scenario control_room --scenario visitor_entrance"
-    " --scenario hotel_forecourt --scenario school_and_clinic": "--steps 64 --threats 2 --by-gas 0",
-    "python -m studies.first_hour --engine surrogate --algorithm PPO --seeds 3 --threats 24"
-    " --by-gas 6 --scenario visitor_entrance": "--steps 64 --seeds 1 --threats 2 --by-gas 0",
+    "python -m studies.first_hour --engine surrogate --threats 24 --by-gas 6 --scenario courtyard"
+    " --scenario control_room --scenario visitor_entrance --scenario hotel_forecourt"
+    " --scenario school_and_clinic": "--steps 64 --seeds 1 --threats 2 --by-gas 0",
     "python -m studies.causes --out docs/pictures/causes.png": "--steps 64 --threats 2 --repeats 1",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
