@@ -152,7 +152,8 @@ def test_no_line_of_a_block_of_commands_is_overlooked() -> None:
 
 
 def test_code_says_its_language_so_that_it_is_not_overlooked() -> None:
-    known = {"python", "sh", "toml", "json", "pycon"}  # the last is a doctest of a docstring
+    # pycon is a doctest of a docstring, yaml the settings of another package.
+    known = {"python", "sh", "toml", "json", "pycon", "yaml"}
     assert {said for said in languages() if not said.startswith("{")} == known
     for page, block in indented_blocks():
         with pytest.raises(SyntaxError):
