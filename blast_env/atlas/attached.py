@@ -29,7 +29,6 @@ NUMBERS: Final[Sequence[str]] = (
 _ABOUT: Final = 0.3  # m/kg^(1/3): width of the bell along the wall
 _GAP: Final = 0.05  # m/kg^(1/3): nearer to the wall it adjoins it
 _LEAST: Final = 0.02
-_RAISED: Final = 0.8  # charges up to here are in the blasts; higher ones count as such
 _STOREYS: Final = 1.5
 
 
@@ -83,7 +82,7 @@ def numbers_of_attached(
             np.log(distance),
             way @ normal / distance,
             bays[:, 2],
-            np.minimum(charge[:, 2], _RAISED),
+            charge[:, 2],
             high,
         ]
     )
