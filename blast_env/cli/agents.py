@@ -14,7 +14,10 @@ AGENT: Final = "agent"
 """The packaged agent as a method."""
 
 SURROGATE: Final = "surrogate"
-"""The search that the packaged agent begins."""
+"""The search that the packaged agent begins, where it is installed."""
+
+FROM_AGENT: Final = "surrogate_from_agent"
+"""Its name in a submission that the agent has begun."""
 
 Digests = Mapping[str, str]
 """Digests of what a method goes by, by its name."""

@@ -33,7 +33,13 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark import judge as judge_submission
 from blast_env.benchmark.judging import read_submission
-from blast_env.cli.agents import AGENT, SURROGATE, agent_without_blasts, surrogate_search
+from blast_env.cli.agents import (
+    AGENT,
+    FROM_AGENT,
+    SURROGATE,
+    agent_without_blasts,
+    surrogate_search,
+)
 from blast_env.cli.command import writes
 from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
 from blast_env.cli.output import print_outcome, print_written, progress_bar, resumable
@@ -183,8 +189,9 @@ def _methods(
         if name == AGENT:
             yield name, method_of(agent_without_blasts()[0]), (0,)
         elif name == SURROGATE:
-            search = surrogate_search(packaged_surrogate())[0]
-            yield name, method_of(search), budgets_of(name, asked)
+            search, digests = surrogate_search(packaged_surrogate())
+            own = FROM_AGENT if AGENT in digests else name  # two methods, never under one name
+            yield own, method_of(search), budgets_of(name, asked)
         else:
             yield from entries([name], asked, sites)
     if runs:

@@ -73,3 +73,10 @@ def test_generated_sites_are_held_out_from_training(tmp_path: Path) -> None:
     assert [*found.problems] == [*problems]
     for played in found.runs:
         assert check_layout(problems[played.problem].scenario, played.layout)
+
+
+def test_an_entry_that_the_packaged_agent_begins_says_so(tmp_path: Path) -> None:
+    options = ("--scenario", "item_sites", "--cases", 1, "--budget", 0, "--cell", 0.5)
+    result = run("judge", "--method", "surrogate", *options, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert SubmissionJudgement.load(tmp_path / "judged_surrogate_from_agent.json").runs
