@@ -87,20 +87,18 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
         raise BlastEnvError(f"cells has shape {cells.shape}, but the grid {grid.shape}")
     if (cells & ~grid.solid).any():
         raise BlastEnvError("cells holds cells of air, but only solid cells have faces")
-    # In each of six directions: the neighbours of the chosen cells, those in the grid, and of these
-    # the ones with air.
+    # In each of six directions: the chosen cells before air in the grid, and that air.
     air: list[NDArray[np.int64]] = []
     axes: list[NDArray[np.int64]] = []
     sides: list[NDArray[np.int64]] = []
+    empty = ~grid.solid
     for axis in range(3):
         for side in (-1, 1):
-            step = np.zeros(3, dtype=np.int64)
-            step[axis] = side
-            chosen = np.argwhere(cells)
-            neighbour = chosen + step
-            inside = (neighbour[:, axis] >= 0) & (neighbour[:, axis] < grid.shape[axis])
-            neighbour = neighbour[inside]
-            neighbour = neighbour[~grid.solid[tuple(neighbour.T)]]
+            low, high = [slice(None)] * 3, [slice(None)] * 3
+            low[axis], high[axis] = slice(None, -1), slice(1, None)
+            solid, beside = (low, high) if side > 0 else (high, low)
+            neighbour = np.argwhere(cells[tuple(solid)] & empty[tuple(beside)])
+            neighbour[:, axis] += side > 0
             air.append(neighbour)
             axes.append(np.full(len(neighbour), axis))
             sides.append(np.full(len(neighbour), side))
