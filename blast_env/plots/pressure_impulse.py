@@ -9,7 +9,7 @@ from blast_env.arrays import FloatArray
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.style import number_on_axis, render_extra
 from blast_env.response.components import FacadeBay, Glazing, Wall
-from blast_env.response.damage import damage_number, under_triangle
+from blast_env.response.damage import damage_numbers, under_triangle
 from blast_env.response.facade import FacadeResponse
 from blast_env.response.glass import pane_of
 from blast_env.response.levels import LevelOfProtection, level_of
@@ -166,12 +166,8 @@ def level_bounds(
         # Bisection of the logarithm of the impulse, at all peaks at once: damage grows with it.
         for _ in range(_HALVINGS):
             middle = np.sqrt(low * high)
-            allows = np.array(
-                [
-                    level_of(damage_number(under_triangle(part, *load))) >= level
-                    for load in zip(peak_pa.tolist(), middle.tolist(), strict=True)
-                ]
-            )
+            damage = damage_numbers(under_triangle(part, peak_pa, middle))
+            allows = np.array([level_of(own) >= level for own in damage.tolist()])
             low, high = np.where(allows, middle, low), np.where(allows, high, middle)
         found[level] = np.sqrt(low * high)
     return found

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from blast_env.response.damage import (
         TriangularLoads,
         bay_damages,
-        damage_number,
+        damage_numbers,
         under_triangle,
     )
     from blast_env.response.facade import (
@@ -99,7 +99,7 @@ __all__ = [
     "building_damage_probability",
     "catalogue",
     "damage_level",
-    "damage_number",
+    "damage_numbers",
     "divide",
     "eardrum_peak_pa",
     "eardrum_rupture_probability",

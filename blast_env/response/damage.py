@@ -101,31 +101,34 @@ _STATIC_S: Final = 0.5
 
 
 def under_triangle(
-    part: Pane | Panel, peak_pa: float, impulse_pa_s: float
+    part: Pane | Panel, peak_pa: float | FloatArray, impulse_pa_s: float | FloatArray
 ) -> GlazingResponses | PanelResponses:
-    """Return the response of one pane or panel to a triangular load without a rise time.
+    """Return the responses of one pane or panel to triangular loads without a rise time.
 
     Args:
         part: The pane or panel.
-        peak_pa: Peak of the load.
-        impulse_pa_s: Impulse, which determines the duration.
+        peak_pa: Peaks of the loads (loads,), or of one.
+        impulse_pa_s: Impulses, which determine the durations.
     """
-    history = triangle(peak_pa, impulse_pa_s)
+    time_s, pressure_pa = triangle(peak_pa, impulse_pa_s)
     if isinstance(part, Panel):
-        return panel_responses([part], *history)
-    return glazing_responses([part], *history)
+        return panel_responses([part] * len(time_s), time_s, pressure_pa)
+    return glazing_responses([part] * len(time_s), time_s, pressure_pa)
 
 
-def triangle(peak_pa: float, impulse_pa_s: float) -> tuple[FloatArray, FloatArray]:
-    """Return the times, s, and the history (1, times) of such a load."""
-    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
-    return np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
+def triangle(
+    peak_pa: float | FloatArray, impulse_pa_s: float | FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the times, s, and the histories of such loads (loads, 2) each."""
+    peak_pa = np.atleast_1d(peak_pa)
+    lasts_s = np.minimum(2.0 * np.atleast_1d(impulse_pa_s) / peak_pa, _STATIC_S)
+    nothing = np.zeros(len(peak_pa))
+    return np.column_stack([nothing, lasts_s]), np.column_stack([peak_pa, nothing])
 
 
-def damage_number(found: GlazingResponses | PanelResponses) -> float:
-    """Return the damage of the first pane or panel as a number."""
-    numbers = found.damage if isinstance(found, PanelResponses) else found.hazard
-    return float(numbers[0])
+def damage_numbers(found: GlazingResponses | PanelResponses) -> FloatArray:
+    """Return the damage of panes or panels as numbers (loads,)."""
+    return found.damage if isinstance(found, PanelResponses) else found.hazard
 
 
 def _kind(bay: Alternatives) -> tuple[object, ...]:

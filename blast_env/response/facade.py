@@ -39,7 +39,7 @@ class FacadeResponse:
 
     Attributes:
         bays: The bays.
-        time_s: Times of the histories (times,).
+        time_s: Times of the histories: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay (bays, times).
         glazed: Indices of the bays with windows (glazed,).
         glazing: Responses of their panes.
@@ -62,6 +62,22 @@ class FacadeResponse:
             glazing=self.glazing.or_worse(other.glazing),
             walls=self.walls.or_worse(other.walls),
         )
+
+    def each(self) -> Iterator["FacadeResponse"]:
+        """Yield the response of each bay alone."""
+        pane, panel = 0, 0  # the next ones
+        for index, bay in enumerate(self.bays):
+            panes, panels = int(bay.glazing is not None), int(bay.wall is not None)
+            yield FacadeResponse(
+                (bay,),
+                self.time_s if self.time_s.ndim == 1 else self.time_s[index],
+                self.pressure_pa[index : index + 1],
+                np.zeros(panes, dtype=np.int64),
+                self.glazing.only(slice(pane, pane + panes)),
+                np.zeros(panels, dtype=np.int64),
+                self.walls.only(slice(panel, panel + panels)),
+            )
+            pane, panel = pane + panes, panel + panels
 
     @property
     def broken_panes(self) -> float:
@@ -310,7 +326,7 @@ def respond(
 
     Args:
         bays: The bays.
-        time_s: Times of the histories, ascending (times,).
+        time_s: Times of the histories, ascending: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
 
     Raises:
@@ -321,20 +337,22 @@ def respond(
     walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
     panes = [pane_of(bay.glazing) for bay in bays if bay.glazing is not None]
     panels = [panel_of(bay.wall, bay.bay.height_m) for bay in bays if bay.wall is not None]
+    times_s = (time_s, time_s) if time_s.ndim == 1 else (time_s[glazed], time_s[walled])
+    glazing = glazing_responses(panes, times_s[0], pressure_pa[glazed])
+    walls = panel_responses(panels, times_s[1], pressure_pa[walled])
     # Once with suction and once without: see above for the reason.
     pushed_pa = pushes(time_s, pressure_pa)
+    if not np.array_equal(pushed_pa, pressure_pa):
+        glazing = glazing.or_worse(glazing_responses(panes, times_s[0], pushed_pa[glazed]))
+        walls = walls.or_worse(panel_responses(panels, times_s[1], pushed_pa[walled]))
     return FacadeResponse(
         bays=tuple(bays),
         time_s=time_s,
         pressure_pa=pressure_pa,
         glazed=np.array(glazed, dtype=np.int64),
-        glazing=glazing_responses(panes, time_s, pressure_pa[glazed]).or_worse(
-            glazing_responses(panes, time_s, pushed_pa[glazed])
-        ),
+        glazing=glazing,
         walled=np.array(walled, dtype=np.int64),
-        walls=panel_responses(panels, time_s, pressure_pa[walled]).or_worse(
-            panel_responses(panels, time_s, pushed_pa[walled])
-        ),
+        walls=walls,
     )
 
 
@@ -400,5 +418,5 @@ def drawn_levels(
 def pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     """Return the histories without suction, until the maximum of each one's impulse."""
     last = impulses(time_s, pressure_pa).argmax(axis=-1)
-    counts = np.arange(len(time_s)) <= last[:, np.newaxis]
+    counts = np.arange(time_s.shape[-1]) <= last[:, np.newaxis]
     return np.where(counts, np.maximum(pressure_pa, 0.0), 0.0)

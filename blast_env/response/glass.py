@@ -342,6 +342,10 @@ class GlazingResponses:
     edge_force_n_m: FloatArray
     hazard: FloatArray
 
+    def only(self, panes: slice) -> "GlazingResponses":
+        """Return those of some of the panes."""
+        return GlazingResponses(*(own[panes] for own in vars(self).values()))
+
     def or_worse(self, other: "GlazingResponses") -> "GlazingResponses":
         """Return for each pane the response with the larger hazard."""
         worse = other.hazard > self.hazard
@@ -374,7 +378,7 @@ def glazing_responses(
 
     Args:
         panes: The panes.
-        time_s: Times of the histories, ascending (times,).
+        time_s: Times of the histories, ascending: (times,), or (panes, times) if they differ.
         pressure_pa: One history per pane, inwards positive (panes, times).
         limit_probability: Largest share of broken panes for the condition `NO_BREAK`.
 
@@ -384,7 +388,8 @@ def glazing_responses(
     check_histories(len(panes), time_s, pressure_pa)
     rows, impulse_pa_s = np.zeros((len(panes), 7)), impulses(time_s, pressure_pa)
     for index, pane in enumerate(panes):
-        _bend(pane, time_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
+        own_s = time_s if time_s.ndim == 1 else time_s[index]
+        _bend(pane, own_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
     peak_m, probability, break_s, *_ = rows.T
     thrown_by = np.reshape([pane.thrown_by for pane in panes], (len(panes), 5))
     stretched, speed, flight, hit = _thrown(rows, thrown_by)

@@ -148,10 +148,9 @@ def check_histories(count: int, time_s: FloatArray, pressure_pa: FloatArray) -> 
     Raises:
         BlastEnvError: If there is not one history per component, with a value at each time.
     """
-    if pressure_pa.shape != (count, len(time_s)):
-        raise BlastEnvError(
-            f"pressure_pa has shape {pressure_pa.shape}, must be ({count}, {len(time_s)})"
-        )
+    expected = (count, time_s.shape[-1])
+    if pressure_pa.shape != expected:
+        raise BlastEnvError(f"pressure_pa has shape {pressure_pa.shape}, must be {expected}")
 
 
 def responses(
@@ -164,7 +163,7 @@ def responses(
 
     Args:
         systems: The systems.
-        time_s: Times of the histories, ascending (times,).
+        time_s: Times of the histories, ascending: (times,), or (systems, times) if they differ.
         pressure_pa: One history per system, inwards positive (systems, times).
         steps_per_period: Least number of steps in the shortest period of a system.
 
@@ -172,13 +171,14 @@ def responses(
         BlastEnvError: If there is not one history per system, or times do not ascend.
     """
     check_histories(len(systems), time_s, pressure_pa)
-    if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
+    if time_s.shape[-1] < 2 or not (np.diff(time_s) > 0.0).all():
         raise BlastEnvError("time_s must ascend, and have at least two times")
     # The impulse until each point is summed once; the kernel interpolates in it, so that a load
     # shorter than a step is not missed.
     rows, impulse_pa_s = np.zeros((len(systems), 6)), impulses(time_s, pressure_pa)
     for index, system in enumerate(systems):
-        history = time_s, pressure_pa[index], impulse_pa_s[index]
+        own_s = time_s if time_s.ndim == 1 else time_s[index]
+        history = own_s, pressure_pa[index], impulse_pa_s[index]
         _integrate(system, history, 1.0, steps_per_period, rows[index])
     return Responses(*rows.T)
 

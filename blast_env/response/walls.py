@@ -191,6 +191,14 @@ class PanelResponses:
         """Levels of damage, one per panel."""
         return damage_level(self.damage)
 
+    def only(self, panels: slice) -> "PanelResponses":
+        """Return those of some of the panels."""
+        motion, *others = vars(self).values()
+        return PanelResponses(
+            Responses(*(own[panels] for own in vars(motion).values())),
+            *(own[panels] for own in others),
+        )
+
     def or_worse(self, other: "PanelResponses") -> "PanelResponses":
         """Return for each panel the response with the larger damage."""
         worse = other.damage > self.damage
@@ -216,7 +224,7 @@ def panel_responses(
 
     Args:
         panels: The panels.
-        time_s: Times of the histories, ascending (times,).
+        time_s: Times of the histories, ascending: (times,), or (panels, times) if they differ.
         pressure_pa: One history per panel, inwards positive (panels, times).
 
     Raises:

@@ -128,6 +128,20 @@ def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
     assert min(helped.values()) > 0
 
 
+def test_bays_under_histories_of_their_own_respond_as_each_alone() -> None:
+    bays = [FacadeBay(bay(), glazing("window_annealed_6"), wall("brick_215"))]
+    bays += [FacadeBay(bay(), wall=wall("timber_frame")), FacadeBay(bay(), glazing("curtain_wall"))]
+    time_s = np.array([[0.0, 0.01, 0.02], [0.0, 0.004, 0.03], [0.0, 0.02, 0.05]])
+    pressure_pa = np.array([[3e4, 0.0, 0.0], [2e4, 0.0, -4e3], [1e4, 2e3, 0.0]])
+    together = [*respond(bays, time_s, pressure_pa).each()]
+    for index, found in enumerate(together):
+        alone = respond(bays[index : index + 1], time_s[index], pressure_pa[index : index + 1])
+        assert found.bays == alone.bays
+        assert found.total_damage == alone.total_damage
+        assert found.level_of_protection == alone.level_of_protection
+        assert found.walls.motion.peak_m.tolist() == alone.walls.motion.peak_m.tolist()
+
+
 def test_echoes_after_the_load_do_not_throw_a_pane_however_long_the_run_lasts() -> None:
     """Without suction, overpressures of 50 Pa for seconds would add up to a blast."""
     bays = [FacadeBay(bay(), glazing("window_laminated_12"))]

@@ -30,10 +30,10 @@ from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
 from blast_env.layout.build_site import build_site, worst_places
 from blast_env.response.components import FacadeBay, Glazing, Wall, catalogue
-from blast_env.response.damage import damage_number, triangle, under_triangle
+from blast_env.response.damage import damage_numbers, triangle, under_triangle
 from blast_env.response.facade import FacadeResponse, assumption_words, respond, response_words
 from blast_env.response.glass import Pane, pane_of
-from blast_env.response.levels import LevelOfProtection, level_of
+from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.response.walls import Panel, panel_of
 from blast_env.sections import PointM
@@ -302,7 +302,7 @@ def stand_offs(
     found = []
     for name, component in components.items():
         part = panel_of(component, storey_m) if isinstance(component, Wall) else pane_of(component)
-        distances_m = {level: curves.stand_off_m(part, level) for level in _LEVELS}
+        distances_m = curves.stand_offs_m(part)
         found.append(StandOff(name, component, distances_m, curves.least_m, curves.most_m))
     return tuple(found)
 
@@ -344,21 +344,22 @@ class _Curves:
         loads = (normally_reflected(own, distances_m, tnt_kg, height_m) for own in _LOADS)
         return np.stack([distances_m, *loads])
 
-    def stand_off_m(self, part: Pane | Panel, level: LevelOfProtection) -> float:
-        """Return the least of the distances at which a part allows a level."""
+    def stand_offs_m(self, part: Pane | Panel) -> dict[LevelOfProtection, float]:
+        """Return the least of the distances at which a part allows each level."""
         distances_m, *loads = self.reflected
-
-        def keeps(index: int) -> bool:
-            found = under_triangle(part, *(float(load[index]) for load in loads))
-            return level_of(damage_number(found)) >= level
-
-        # Damage falls with distance, so the first distance that keeps the level is found by
-        # bisection.
-        low, high = -1, _DISTANCES  # fails at the first, keeps at the second
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (low, middle) if keeps(middle) else (middle, high)
-        return np.inf if high == _DISTANCES else float(distances_m[high])
+        # Damage falls with distance, so the first distance that keeps a level is found by
+        # bisection, of all levels at once.
+        most = 5.0 - np.array(_LEVELS)  # damage of a level is less
+        low, high = np.full(len(_LEVELS), -1), np.full(len(_LEVELS), _DISTANCES)
+        while (high - low > 1).any():
+            middle = (low + high) // 2  # fails at `low`, keeps at `high`
+            asked = np.maximum(middle, 0)
+            damage = damage_numbers(under_triangle(part, *(load[asked] for load in loads)))
+            keeps, open_ends = damage < most, high - low > 1
+            high = np.where(open_ends & keeps, middle, high)
+            low = np.where(open_ends & ~keeps, middle, low)
+        reach_m = np.append(distances_m, np.inf)[high]
+        return dict(zip(_LEVELS, reach_m.tolist(), strict=True))
 
     def reach_m(self, index: int, limit: float) -> float:
         """Return the distance from which a row of `reflected` keeps a limit; may be infinite."""
@@ -560,13 +561,14 @@ def _screened(
     order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
     own, in_view = _named(atlas, places[worst]), facade.sees(places[worst])
+    load_pa, load_pa_s = peaks[worst], impulses[worst]
+    responses = respond(facade.bays, *triangle(load_pa, load_pa_s)).each()
     bays = []
-    for index, filled in enumerate(facade.bays):
-        load = float(peaks[worst, index]), float(impulses[worst, index])
-        response = respond([filled], *triangle(*load))
+    for index, (filled, response) in enumerate(zip(facade.bays, responses, strict=True)):
+        load = float(load_pa[index]), float(load_pa_s[index])
         away_m, is_seen = float(ways.away_m[worst, index]), bool(in_view[index])
         found = BayScreening(filled, away_m, is_seen, *load, response)
-        peak_pa, pa_s = (float(load[worst, index]) for load in likely)
+        peak_pa, pa_s = (float(part[worst, index]) for part in likely)
         found = replace(found, likely_pa_s=pa_s, likely_peak_pa=peak_pa)
         if own is not None:
             middle, low, high = (float(part[index, 0]) for part in own.factors[:3])
@@ -604,11 +606,9 @@ def _tabulated(
     asked = np.zeros((_POINTS, _POINTS), dtype=bool)
     for more in product((0, 1), repeat=2):
         asked[row + more[0], column + more[1]] = True
-    table = np.zeros(asked.shape)
-    for own in zip(*np.nonzero(asked), strict=True):
-        load = (float(np.exp(axis[index])) for axis, index in zip(axes, own, strict=True))
-        peak, impulse = load
-        table[own] = max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
+    table, places = np.zeros(asked.shape), np.nonzero(asked)
+    loads = [np.exp(axis[index]) for axis, index in zip(axes, places, strict=True)]
+    table[places] = np.max([damage_numbers(under_triangle(part, *loads)) for part in parts], axis=0)
     first, last = (
         (1.0 - across) * table[own, column] + across * table[own, column + 1]
         for own in (row, row + 1)
