@@ -32,6 +32,7 @@ from studies.gas.judgement import Judgement
 from studies.gas.judgement import judge as judgement
 from studies.gas.loads import yard
 from studies.gas.oblique import oblique_loads
+from studies.gas.peaks import ENGINES, FACADES, facade_load
 from studies.gas.reference import free_field, wide_wall
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
@@ -74,6 +75,24 @@ def kingery_bulmash(
                     values = (ratio.impulse, ratio.arrival, ratio.peak)
                     start = (f"{charge_kg:g}", f"{cell_m:g}", name, f"{ratio.z_m_kg:.2f}")
                     rows.append((*start, *(f"{value:.3f}" for value in values)))
+        print_line(markdown_table(headers, rows))
+
+
+@app.command()
+def peaks(
+    facades: Annotated[int, typer.Option(min=1, help="Charges before a facade.")] = len(FACADES),
+) -> None:
+    """Print the loads opposite a charge before a facade, over the curves, by the cells."""
+    headers = ("charge (kg)", "distance (m)", "cells", "peak", "impulse", "CPU (s)")
+    rows = []
+    with user_errors():
+        facade_load(*FACADES[0], ENGINES[0])  # compiles
+        for charge_kg, distance_m in FACADES[:facades]:
+            for engine in ENGINES:
+                load = facade_load(charge_kg, distance_m, engine)
+                start = (f"{charge_kg:g}", f"{distance_m:g}", engine.cell_words)
+                numbers = (f"{load.peak:.2f}", f"{load.impulse:.2f}", f"{load.cpu_s:.1f}")
+                rows.append((*start, *numbers))
         print_line(markdown_table(headers, rows))
 
 

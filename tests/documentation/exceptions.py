@@ -144,6 +144,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.gas kingery-bulmash --charges 100": "--charges 20 --distances 4.3",
     "python -m studies.gas corners": "--sizes 0.5",
+    "python -m studies.gas peaks": "--facades 1",
     "python -m studies.gas judge --random-layouts 18 --charges 1": (
         "--random-layouts 1 --charges 1 --seeds 1"
     ),

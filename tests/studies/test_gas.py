@@ -14,6 +14,7 @@ from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending
 from studies.gas.judgement import Judgement
 from studies.gas.loads import impulse_until, yard
+from studies.gas.peaks import facade_load
 from studies.gas.reference import free_field, wide_wall
 from tests.gas_sites import glazed_hut
 
@@ -34,6 +35,12 @@ def test_waves_are_held_against_the_curves() -> None:
     assert wave.impulse == pytest.approx(1.0, abs=0.10)
     assert (wall.arrival, wave.arrival) == pytest.approx((1.0, 1.0), abs=0.05)
     assert max(wall.peak, wave.peak) < 0.7
+
+
+def test_opposite_a_charge_a_facade_has_the_impulse_of_the_curve_and_less_peak() -> None:
+    load = facade_load(20.0, 10.0, GasEngine())
+    assert load.impulse == pytest.approx(1.0, abs=0.06)
+    assert 0.4 < load.peak < 0.6
 
 
 def test_a_run_misses_next_to_nothing(site: Scenario) -> None:
