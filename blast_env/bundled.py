@@ -23,6 +23,9 @@ STREET_SITES: Final = "street_sites"
 COURT_SITES: Final = "court_sites"
 """Name of courts between several buildings, of any size."""
 
+SQUARE_SITES: Final = "square_sites"
+"""Name of short fronts on open ground, of any size."""
+
 HEADROOM_SITES: Final = "headroom_sites"
 """Name of those of the sites on which layouts are ahead of all rules."""
 

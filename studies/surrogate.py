@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import torch
 import typer
+from blast_agents import packaged_agent
 
 from blast_env.answers.terminal import print_line
 from blast_env.arrays import BoolArray
@@ -78,9 +79,9 @@ def blasts(
     kind: Annotated[
         str,
         typer.Option(
-            help="sites, item_sites, kerb_sites, street_sites, court_sites, or with their side in "
-            "m: close_sites/18, front_sites/18 (only walls count that the blast comes from), "
-            "large_sites/60."
+            help="sites, item_sites, kerb_sites, street_sites, court_sites, square_sites, or with "
+            "their side in m: close_sites/18, large_sites/60, front_sites/18 (only walls count "
+            "that the blast comes from)."
         ),
     ] = ITEM_SITES,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,
@@ -88,6 +89,7 @@ def blasts(
     surrogate: Annotated[Path | None, typer.Option(help="Whose favourites are tried.")] = None,
     favourites: Annotated[int, typer.Option(min=1, help="How many of those.")] = 3,
     changes: Annotated[int, typer.Option(min=1, help="Layouts that it looks at for them.")] = 300,
+    draws: Annotated[int, typer.Option(min=0, help="Draws of the packaged agent.")] = 0,
     threats: Annotated[int, typer.Option(min=1, help="Charges on each.")] = 1,
     cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
     cache: Annotated[Path, typer.Option(help="Folder in which they are kept.")] = Path(
@@ -103,7 +105,7 @@ def blasts(
     with user_errors(), running_on(cluster):
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
-        recipe = Recipe(layouts, rules, liked, favourites, changes)
+        recipe = Recipe(layouts, rules, liked, favourites, changes, draws)
         names = site_names([kind], first, sites)
         engine = find_engine("gas", cells=cells)
         run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, cache=cache)
@@ -122,6 +124,7 @@ class Recipe:
         favourites: Number of these: every tenth layout of a search by the surrogate's predictions,
             from the best on, because neighbours in that ranking are much alike.
         changes: Layouts that this search evaluates, besides those of the rules.
+        draws: Number of draws of the packaged agent.
     """
 
     layouts: int = 12
@@ -129,6 +132,7 @@ class Recipe:
     surrogate: Surrogate | None = None
     favourites: int = 3
     changes: int = 300
+    draws: int = 0
 
     def of(self, site: Scenario, threat: LoadCase, seed: int) -> list[Layout]:
         """Return the layouts for a threat, sorted and distinct, the empty one first."""
@@ -151,6 +155,8 @@ class Recipe:
             guesses = Guesses.of(self.surrogate, LoadCaseSet(site, (threat,), charge=threat.charge))
             liked = improved(guesses, [(), *ruled], self.changes, rng)
             found += liked[: _EVERY * self.favourites : _EVERY]
+        if self.draws:
+            found += packaged_agent().sample(site, threat.charge, self.draws, seed)
         return list(dict.fromkeys(tuple(sorted(layout)) for layout in found))
 
 

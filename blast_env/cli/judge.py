@@ -56,8 +56,8 @@ _ScenarioOption = Annotated[
     list[str] | None,
     typer.Option(
         help="Your own site in the place of problems: a file, a bundled name, or for generated "
-        "ones sites, item_sites, large_sites, kerb_sites, street_sites, court_sites or "
-        "headroom_sites; may be given again.",
+        "ones sites, item_sites, large_sites, kerb_sites, street_sites, court_sites, "
+        "square_sites or headroom_sites; may be given again.",
     ),
 ]
 _ThreatOption = Annotated[

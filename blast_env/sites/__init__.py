@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         KerbSiteRanges,
         court_site,
         kerb_site,
+        square_site,
         street_site,
     )
     from blast_env.sites.module_sites import SiteRanges
@@ -82,6 +83,7 @@ __all__ = [
     "headroom_site",
     "kerb_site",
     "large_ranges",
+    "square_site",
     "street_site",
     "training_sites",
     "turned",

@@ -53,6 +53,12 @@ COURT_ACROSS_M: Final[Span] = (13.0, 24.0)
 COURT_ALONG_M: Final[Span] = (12.0, 24.0)
 """Least and largest size across that, m."""
 
+SQUARE_ACROSS_M: Final[Span] = (10.0, 20.0)
+"""Least and largest size of a square from the kerb to behind the front, m."""
+
+SQUARE_ALONG_M: Final[Span] = (14.0, 26.0)
+"""Least and largest size across that, m."""
+
 _HEIGHTS_M: Final = (0.8, 1.0, 1.0, 1.4, 2.0, 2.0, 2.5, 3.0, 3.6, 3.6, 4.0)
 """Heights of pieces of the catalogue and of T-walls."""
 
@@ -234,6 +240,34 @@ def court_site(seed: int) -> Scenario:
         wing_probability=1.0,
         all_faces_probability=0.5,
         vehicle_probability=0.2,
+    )
+    return generate_site(seed, ranges)
+
+
+def square_site(seed: int) -> Scenario:
+    """Return the site of a seed with short fronts, past whose ends charges may go off.
+
+    Two of them compete for the budget, or a vehicle is kept away to the open ends of a street.
+
+    Args:
+        seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
+    """
+    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 3)))
+    across_m, along_m = draws.length_m(SQUARE_ACROSS_M), draws.length_m(SQUARE_ALONG_M)
+    ranges = KerbSiteRanges(
+        across_m=across_m,
+        along_m=along_m,
+        tnt_kg=(50.0, 150.0),
+        front_share=(0.2, 0.5),
+        second_probability=0.6,
+        opposite_probability=0.5,
+        places=(2, 3),
+        vehicle_probability=0.5,
+        kerb_m=(0.0, 4.0),
+        zone_from_charge_m=(0.5, 2.0),
     )
     return generate_site(seed, ranges)
 

@@ -15,6 +15,7 @@ from blast_env.bundled import (
     KERB_SITES,
     LARGE_SITES,
     SITES,
+    SQUARE_SITES,
     STREET_SITES,
 )
 from blast_env.errors import BlastEnvError
@@ -23,7 +24,7 @@ from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import HELD_OUT_SITES, MOST_SEED, RANGES, generate_site
 from blast_env.sites.headroom_sites import headroom_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
-from blast_env.sites.kerb_sites import court_site, kerb_site, street_site
+from blast_env.sites.kerb_sites import court_site, kerb_site, square_site, street_site
 from blast_env.sites.ranges import Ranges
 
 FAMILIES: Final[Mapping[str, Ranges]] = MappingProxyType(
@@ -37,6 +38,7 @@ SITE_KINDS: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
         KERB_SITES: kerb_site,
         STREET_SITES: street_site,
         COURT_SITES: court_site,
+        SQUARE_SITES: square_site,
         HEADROOM_SITES: headroom_site,
     }
 )

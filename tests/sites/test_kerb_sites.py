@@ -7,7 +7,14 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.site import Scenario
-from blast_env.sites import KerbSiteRanges, court_site, generate_site, kerb_site, street_site
+from blast_env.sites import (
+    KerbSiteRanges,
+    court_site,
+    generate_site,
+    kerb_site,
+    square_site,
+    street_site,
+)
 
 SEEDS = range(20_000, 20_012)
 
@@ -92,3 +99,13 @@ def test_most_courts_have_a_wing_that_makes_a_corner_with_the_front() -> None:
         assert not wing.rectangle_m.overlaps(front.rectangle_m)
         assert wing.rectangle_m.grown(0.1).overlaps(front.rectangle_m)
     assert {len(site.structures) for site in courts} & {3, 4}
+
+
+def test_on_squares_charges_may_go_off_past_the_ends_of_short_fronts() -> None:
+    squares = tuple(map(square_site, SEEDS[:4]))
+    assert {len(site.vehicles) for site in squares} == {0, 1}
+    for site in squares:
+        fronts = [structure for structure in site.structures if structure.protected]
+        for front in fronts:
+            _, bottom, _, top = front.rectangle_m
+            assert top - bottom <= 0.5 * site.site.height_m + 0.5

@@ -619,6 +619,9 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     liked = Recipe(0, 0, by_hand(), 2).of(YARD, threat, 1)[1:]
     best, tenth = Guesses.of(by_hand(), case()).loads(liked)
     assert best < tenth < Guesses.of(by_hand(), case()).loads([*ruled]).min()
+    drawn = Recipe(0, 0, draws=3).of(YARD, threat, 1)[1:]
+    assert 0 < len(drawn) <= 3
+    assert all(LayoutState.of(YARD, layout).layout == layout for layout in drawn)
 
 
 def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
