@@ -35,7 +35,7 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation.cases import one_per_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.files import make_folder
@@ -162,7 +162,7 @@ class DemoTraining:
     curve: list[tuple[int, float, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        threats = one_of_each_charge(draw_threats(self.scenario, range(16)))
+        threats = one_per_charge(draw_threats(self.scenario, range(16)))
         self._case, self._judge = LoadCaseSet(self.scenario, threats), Evaluators(JUDGE)
         self.reward = RewardCorrection(site_of(self.scenario))
         engine = SurrogateEngine()
@@ -289,7 +289,7 @@ class AgentComparison:
         return max(self.rules, key=lambda name: self.results[name].reduction.value)
 
     @property
-    def best_rule_each(self) -> Evaluation:
+    def best_rules(self) -> Evaluation:
         """The best rule for each charge, which only blasts with all rules can determine."""
         rules = [self.results[name] for name in self.rules]
         chosen = np.argmin([rule.loads.mean(axis=1) for rule in rules], axis=0).tolist()
@@ -301,16 +301,16 @@ class AgentComparison:
     @property
     def is_ahead(self) -> bool:
         """Whether the agent is ahead of the best rule for each case, with its interval above 0."""
-        return bool(self.agent.difference(self.best_rule_each).low > 0.0)
+        return bool(self.agent.difference(self.best_rules).low > 0.0)
 
     @property
     def verdict(self) -> str:
         """The reduction and cost of the layout, and its lead over rules and random layouts."""
-        others = self.results[RANDOM], self.results[self.best_rule], self.best_rule_each
+        others = self.results[RANDOM], self.results[self.best_rule], self.best_rules
         leads = [self.agent.difference(other).scaled(100.0) for other in others]
         if isnan(leads[0].low):
             return "No verdict: one charge gives no interval."
-        random, rule, best_of_each = (
+        random, rule, every_rule = (
             f"{lead.value:+.1f} points ({lead.low:+.1f} to {lead.high:+.1f})" for lead in leads
         )
         scenario, reduction = self.agent.cases[0].scenario, self.agent.reduction
@@ -320,14 +320,14 @@ class AgentComparison:
         return (
             f"The layout takes off {percent(reduction.value)} of the load ({interval(reduction)}) "
             f"and costs {cost:g}{budget}. It {ahead} of the rules: {rule} beside the best one, "
-            f"{self.best_rule!r}, {best_of_each} beside the best for each charge, {random} beside "
+            f"{self.best_rule!r}, {every_rule} beside the best for each charge, {random} beside "
             "random layouts (95 % intervals of paired differences)."
         )
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the printed table, one row per method; see `HEADERS`."""
         others = {name: result for name, result in self.results.items() if name != AGENT}
-        others |= {"best rule for each case": self.best_rule_each, AGENT: self.agent}
+        others |= {"best rule for each case": self.best_rules, AGENT: self.agent}
         return [self._row(name, other) for name, other in others.items()]
 
     def _row(self, name: str, result: Evaluation) -> tuple[str, ...]:
@@ -343,7 +343,7 @@ class AgentComparison:
 
 def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[LoadCaseSet]:
     """Return a case for each mass of the judgement, with one threat for each place."""
-    count, cases = len(one_of_each_charge(draw_threats(scenario, range(16)))), []
+    count, cases = len(one_per_charge(draw_threats(scenario, range(16)))), []
     for index, tnt_kg in enumerate(settings.masses_kg):
         charge = tuple(source.model_copy(update={"tnt_kg": tnt_kg}) for source in scenario.charge)
         site = scenario.model_copy(update={"charge": charge})

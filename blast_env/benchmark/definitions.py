@@ -14,7 +14,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import (
     fixed_charges,
-    one_of_each_charge,
+    one_per_charge,
     search_set,
 )
 from blast_env.layout.build_site import draw_threat
@@ -131,8 +131,8 @@ class Definition:
         judged, met = (_DRAWS, _DRAWS) if few else (own, _PRACTICE_CHARGES)
         threats = draw_threats(scenario, SeedRange.TEST.seeds(0, judged))
         drawn = search_set(scenario, None, charges=met)
-        drawn = replace(drawn, threats=one_of_each_charge(drawn.threats))
-        return LoadCaseSet(scenario, one_of_each_charge(threats), search_set=drawn)
+        drawn = replace(drawn, threats=one_per_charge(drawn.threats))
+        return LoadCaseSet(scenario, one_per_charge(threats), search_set=drawn)
 
 
 def _charge(threat: LoadCase) -> object:

@@ -15,7 +15,7 @@ from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_of_each_charge
+from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_per_charge
 from blast_env.evaluation.engines.contract import (
     CALIBRATED_ENGINES,
     ENGINE_NAMES,
@@ -245,7 +245,7 @@ class ChargeInput:
         """
         drawn = in_turn(scenario, draw_threats(scenario, range(draws)))
         fixed = (replace(draw, charge=self.fixed(scenario, draw.charge)) for draw in drawn)
-        return one_of_each_charge(fixed)
+        return one_per_charge(fixed)
 
     def drawn_by(
         self, scenario: Scenario, seeds: Sequence[int], engine: Engine
@@ -257,4 +257,4 @@ class ChargeInput:
         """
         drawn = in_turn(scenario, draw_threats(scenario, seeds))
         threats = tuple(LoadCase(self.fixed(scenario, draw.charge), draw.seed) for draw in drawn)
-        return threats if engine.has_noise else one_of_each_charge(threats)
+        return threats if engine.has_noise else one_per_charge(threats)

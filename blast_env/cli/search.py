@@ -76,7 +76,7 @@ from blast_env.evaluation import (
     draw_threats,
 )
 from blast_env.evaluation.campaign import Campaign
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation.cases import one_per_charge
 from blast_env.evaluation.engines import JUDGE, final_engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
@@ -310,7 +310,7 @@ def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | No
     if not problem.evaluator.engine.has_noise:  # each charge is one blast
         used = {threat.charge for threat in problem.threats}
         threats = tuple(
-            load_case for load_case in one_of_each_charge(threats) if load_case.charge not in used
+            load_case for load_case in one_per_charge(threats) if load_case.charge not in used
         )
     if not threats:
         return None

@@ -16,7 +16,7 @@ from blast_env.evaluation import (
     SeedRange,
     draw_threats,
 )
-from blast_env.evaluation.cases import one_of_each_charge, search_set
+from blast_env.evaluation.cases import one_per_charge, search_set
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
@@ -137,5 +137,5 @@ def problem_of(
         case = LoadCaseSet(found, (LoadCase(charge, first),), charge=charge)
     else:
         threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
-        case = LoadCaseSet(found, one_of_each_charge(threats))
+        case = LoadCaseSet(found, one_per_charge(threats))
     return DesignProblem(BlastEvaluator(found, engine), case, processes)

@@ -300,7 +300,7 @@ def search_set(
     return LoadCaseSet(found, threats, realisations, risk, charge, seed=seed)
 
 
-def one_of_each_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
+def one_per_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
     """Return the first threat of each charge, for engines without noise.
 
     Ranks of a vehicle beyond the number of its places repeat the same places.

@@ -98,10 +98,10 @@ class PlacingPainter:
         placement = LayoutState.empty(self._scenario)
         catalogue = placement.catalogue
         numbers = {variant.name: number for number, variant in enumerate(catalogue.variants)}
-        one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
+        pieces = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
         zone = self._scenario.zone
         full = cell_features(zone, np.zeros(zone.shape, dtype=bool))
-        barrier = barrier_features(self._scenario, one_each)
+        barrier = barrier_features(self._scenario, pieces)
         return legend_of(without_counts((*self._of(placement), *full, *barrier)))
 
 

@@ -133,7 +133,7 @@ class PieceKnowledge:
         # once, and layouts are put together from them.
         first = len(self._numbers) + 1
         pieces = np.array(boxes)
-        stopped, is_open = self._ways.stopped_by_each(pieces)
+        stopped, is_open = self._ways.stopped_by(pieces)
         sent = self._sent(pieces)
         self._numbers.update(zip(boxes, range(first, first + len(boxes)), strict=True))
         self._stopped = _with(self._stopped, _of_places(stopped), first)

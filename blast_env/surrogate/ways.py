@@ -121,7 +121,7 @@ class Ways:
         behind: IntArray = np.flatnonzero(is_behind)
         return behind, _open_shares(behind, stopped, is_straight_open, self.weights)
 
-    def stopped_by_each(self, solids: FloatArray) -> tuple[IntArray, BoolArray]:
+    def stopped_by(self, solids: FloatArray) -> tuple[IntArray, BoolArray]:
         """Return what each solid alone stops beside the structures.
 
         Args:
@@ -135,7 +135,7 @@ class Ways:
         stopped = np.repeat(self.stopped[np.newaxis], len(solids), axis=0)
         is_straight_open = np.repeat(self.is_straight_open[np.newaxis], len(solids), axis=0)
         by = (self.by_m, self.by_height_m)
-        _stop_each(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
+        _stop_alone(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
         return stopped, is_straight_open
 
     @property
@@ -270,7 +270,7 @@ def _open_shares(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _stop_each(
+def _stop_alone(
     start_m: FloatArray,
     points_m: FloatArray,
     by_m: FloatArray,
@@ -279,7 +279,7 @@ def _stop_each(
     stopped: IntArray,
     is_straight_open: BoolArray,
 ) -> None:
-    """Mark the paths that each solid blocks; see `Ways.stopped_by_each`."""
+    """Mark the paths that each solid blocks; see `Ways.stopped_by`."""
     is_behind = np.zeros(len(points_m), dtype=np.bool_)
     for number in range(len(solids)):
         _stop(

@@ -139,7 +139,7 @@ class Look(Answer):
     score_0: Annotated[str, Field(description="What scores 0.")]
     score_1: Annotated[str, Field(description="What scores 1.")]
     seed: int
-    blasts_each: Annotated[int, Field(description="Blasts that one call of `blast` costs.")]
+    blasts_per_layout: Annotated[int, Field(description="Blasts that one call of `blast` costs.")]
     width_m: Annotated[float, Field(description="Extent of the site in x, from west to east.")]
     height_m: Annotated[float, Field(description="Extent in y, from south to north.")]
     threats: tuple[Threat, ...]

@@ -102,7 +102,7 @@ def _best_of_blasts(layouts: list[list[Values]]) -> Script:
     site = yield "look", {}
     best, best_share, left = layouts[:1], 1.0, site["blasts_left"]
     for layout in layouts:
-        if left < site["blasts_each"]:
+        if left < site["blasts_per_layout"]:
             break
         found = yield from _waited("blast", layout)
         left, share = found["blasts_left"], found["blast"]["share"]

@@ -52,7 +52,7 @@ def look_at(problem: BenchmarkProblem, picture: bool, **more: Any) -> Look:
     return Look(
         problem=problem.name,
         task=_TASK.format(noun=scenario.objective.noun),
-        blasts_each=len(problem.threats),
+        blasts_per_layout=len(problem.threats),
         width_m=scenario.site.width_m,
         height_m=scenario.site.height_m,
         threats=tuple(_threats(problem)),

@@ -89,7 +89,7 @@ _TABLE: Final = (
     Tool(
         "blast",
         "Runs a blast by gas dynamics: the share of the load that a layout leaves. Costs "
-        "`blasts_each` of the budget, once for each layout; failures cost nothing." + _WAITS,
+        "`blasts_per_layout` of the budget, once for each layout; failures cost nothing." + _WAITS,
         LayoutArguments,
         Outcome,
         Session.blast,

@@ -16,7 +16,7 @@ from blast_env.design.search import (
     MeasureKind,
     advise,
     advise_until,
-    against_each,
+    against_several,
     kinds_for,
     only,
 )
@@ -175,12 +175,12 @@ def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budge
     """The mean of two charges is where none is: a wall before each of them is another layout."""
     scenario = only(glazed_yard(target="medium"), MeasureKind.SHIELD)
     charges = [Charge((2.0, y_m), 5.0) for y_m in (2.0, 10.0)]
-    layouts = list(against_each(scenario, charges))
+    layouts = list(against_several(scenario, charges))
     costs = [LayoutState(scenario, layout).cost for layout in layouts]
     assert 0.0 < max(costs) <= (scenario.zone.budget or 0.0)
     middle = scenario.zone.rows / 2
     assert any(min(x[0] for x in layout) < middle < max(x[0] for x in layout) for layout in layouts)
-    assert list(against_each(scenario, charges[:1])) == []
+    assert list(against_several(scenario, charges[:1])) == []
 
 
 def test_a_layout_passes_with_the_probability_that_is_wanted(

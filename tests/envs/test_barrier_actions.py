@@ -338,7 +338,7 @@ def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str)
             assert (mask == info["action_mask"]).all()
             assert mask[-1]
             layout = env.placement.cells
-            for action in _some_of_each(mask[:-1], rng):
+            for action in _some_of_both(mask[:-1], rng):
                 cell = divmod(action, _zone(scenario).columns)
                 _check(env.explain(cell), mask[action])
                 assert _is_accepted(scenario, (*layout, cell)) == mask[action]
@@ -361,7 +361,7 @@ def _check(reason: str | None, is_legal: bool) -> None:
         assert len(reason) > 20
 
 
-def _some_of_each(mask: np.ndarray, rng: np.random.Generator) -> list[int]:
+def _some_of_both(mask: np.ndarray, rng: np.random.Generator) -> list[int]:
     """Return an action that is legal and one that is not, where there are such."""
     kinds = (np.flatnonzero(mask), np.flatnonzero(~mask))
     return [int(rng.choice(kind)) for kind in kinds if len(kind)]

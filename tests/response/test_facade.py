@@ -118,13 +118,11 @@ def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
         pushed = np.maximum(histories, 0.0)
         found = respond(bays, time_s, histories)
         panels = [panel_of(bay.wall, 3.5) for bay in bays if bay.wall is not None]
-        each_way = [
-            panel_responses(panels, time_s, case[:2]).damage for case in (histories, pushed)
-        ]
-        assert found.walls.damage.tolist() == np.maximum(*each_way).tolist()
+        damages = [panel_responses(panels, time_s, case[:2]).damage for case in (histories, pushed)]
+        assert found.walls.damage.tolist() == np.maximum(*damages).tolist()
         assert respond(bays, time_s, pushed).level_of_protection >= found.level_of_protection
         for panel in range(2):
-            helped[bool(each_way[0][panel] < each_way[1][panel])] += 1
+            helped[bool(damages[0][panel] < damages[1][panel])] += 1
     assert min(helped.values()) > 0
 
 

@@ -43,7 +43,7 @@ def test_what_is_repeated_is_a_heap_or_a_wall() -> None:
         ended = env.step(20 * 16 + 8)[2]
     high, wide = np.ptp(np.array(env.placement.cells), axis=0).tolist()
     assert (high >= 15, wide) == (True, 0)
-    found = repeated(env, [0], each_way=1)
+    found = repeated(env, [0], lines=1)
     assert found["heaps"].value == found["walls"].value == pytest.approx(1.0 - 0.9**16)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation.cases import one_per_charge
 from blast_env.evaluation.engines import find_engine
 from blast_env.layout import LayoutState, load_layout
 from blast_env.response import DamageLevel, plate_curve
@@ -37,9 +37,7 @@ def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
     scenario = load_scenario("guard_post")
     evaluator = BlastEvaluator(scenario, find_engine("gas", 0.5))
     found, target = load_layout(FOUND / "guard_post.json", scenario), scenario.objective.level
-    charges = [
-        load_case.charge for load_case in one_of_each_charge(draw_threats(scenario, range(16)))
-    ]
+    charges = [load_case.charge for load_case in one_per_charge(draw_threats(scenario, range(16)))]
     assert len(charges) == 2
     assert target is not None
     assert not consequences(evaluator, (), charges).passes(target)

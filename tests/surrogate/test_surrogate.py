@@ -217,7 +217,7 @@ def test_several_pieces_stop_what_the_one_stops_that_stops_most(
 ) -> None:
     solids = np.array([wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes])
     point_m = np.array([[20.0, 0.0, 1.5], [20.0, 0.0, 3.0], [20.0, 4.0, 1.5]])
-    stopped, is_open = Ways.between(CHARGE_M, point_m, 100.0, NOTHING).stopped_by_each(solids)
+    stopped, is_open = Ways.between(CHARGE_M, point_m, 100.0, NOTHING).stopped_by(solids)
     together = Ways.between(CHARGE_M, point_m, 100.0, solids)
     assert (stopped.max(axis=0) == together.stopped).all()
     assert (is_open.all(axis=0) == together.is_straight_open).all()

@@ -135,17 +135,17 @@ class BatchVecEnv(VecEnv):
     def step_wait(self) -> VecEnvStepReturn:
         """Make the actions, and begin other episodes where one ends."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
-        ended, of_each = terminated | truncated, []
+        ended, own_infos = terminated | truncated, []
         for index in range(self.num_envs):
-            of_each.append(_of_one(infos, index))
+            own_infos.append(_of_one(infos, index))
             cut = bool(truncated[index] and not terminated[index])
-            of_each[index]["TimeLimit.truncated"] = cut
+            own_infos[index]["TimeLimit.truncated"] = cut
             if ended[index]:
-                of_each[index]["terminal_observation"] = _of_one(observations, index)
+                own_infos[index]["terminal_observation"] = _of_one(observations, index)
         if ended.any():
             seeds = self._drawn([None] * self.num_envs, ended)
             observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": ended})
-        return cast("VecEnvObs", observations), rewards.astype(np.float32), ended, of_each
+        return cast("VecEnvObs", observations), rewards.astype(np.float32), ended, own_infos
 
     def _drawn(
         self, seeds: Sequence[int | None], chosen: Iterable[bool] = repeat(True)

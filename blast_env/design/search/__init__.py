@@ -9,7 +9,7 @@ if TYPE_CHECKING:
         MeasureKind,
         advise,
         advise_until,
-        against_each,
+        against_several,
         kinds_for,
         only,
     )
@@ -74,7 +74,7 @@ __all__ = [
     "SurrogateSearch",
     "advise",
     "advise_until",
-    "against_each",
+    "against_several",
     "cut",
     "find_proposer",
     "improved",

@@ -213,7 +213,7 @@ def advise(
             unhardened = scenario.model_copy(update={"build_zone": unprotected})
             ruled = layouts_by_rule(unhardened, problem.known_charge)
             yield from ruled.values()
-            yield from against_each(unhardened, problem.case.charges)
+            yield from against_several(unhardened, problem.case.charges)
             for layout in ruled.values():
                 yield layout[: len(layout) // 2]
             while True:
@@ -292,7 +292,7 @@ def best_of(found: Iterable[Advice], judge: Callable[[Layout], Verdict]) -> Advi
     return min(found, key=lambda advice: (-judge(advice.layout), advice.best))
 
 
-def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
+def against_several(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
     """Yield for each rule the union of its layouts against several charges.
 
     Each charge gets an equal share of the budget. Nothing is yielded for a single charge or a

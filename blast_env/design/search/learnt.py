@@ -20,7 +20,7 @@ from blast_env.design.search.problem import (
 from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
-from blast_env.evaluation.cases import one_of_each_charge, search_set
+from blast_env.evaluation.cases import one_per_charge, search_set
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
 from blast_env.surrogate.correction import Correction
@@ -338,7 +338,7 @@ def case_for(scenario: Scenario, charge: AnyCharge | None) -> LoadCaseSet:
     drawn = search_set(scenario, charge, charges=_DRAWN_CHARGES)
     if charge is not None:
         return drawn
-    return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
+    return replace(drawn, threats=one_per_charge(drawn.threats)[:_HIDDEN_CHARGES])
 
 
 _LAYOUTS_A_RULE: Final = 8

@@ -85,7 +85,7 @@ def _check_companions(path: Path) -> None:
     """Refuse a shapefile that came alone: GDAL reads one without its table, and says nothing."""
     if path.suffix.lower() != ".shp":
         return
-    beside = {each.suffix.lower() for each in path.parent.glob(f"{glob.escape(path.stem)}.*")}
+    beside = {file.suffix.lower() for file in path.parent.glob(f"{glob.escape(path.stem)}.*")}
     missing = [suffix for suffix in _COMPANIONS if suffix not in beside]
     if missing:
         raise BlastEnvError(

@@ -124,7 +124,7 @@ class SiteMap:
             for feature, (x, y) in zip(self.features, middles, strict=True)
             if x == x
         }
-        self.ledger.entries = list(_one_fate_each(self.ledger.entries, set(used)))
+        self.ledger.entries = list(_with_one_fate(self.ledger.entries, set(used)))
         fates = {entry.place for entry in self.ledger.of(*FATES)}
         for place in dict.fromkeys(feature.place for feature in self.features):
             if place in used:
@@ -155,7 +155,7 @@ class SiteMap:
             )
 
 
-def _one_fate_each(entries: Iterable[LedgerEntry], used: set[str]) -> Iterator[LedgerEntry]:
+def _with_one_fate(entries: Iterable[LedgerEntry], used: set[str]) -> Iterator[LedgerEntry]:
     """Yield the entries, with one fate for each object at most, and none for those used.
 
     Other fates are those of pieces: a remark, unless the piece is outside the site.

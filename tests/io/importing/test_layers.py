@@ -181,8 +181,8 @@ def test_an_empty_layer_has_no_say_and_an_empty_file_says_so(tmp_path: Path) -> 
 def test_a_shapefile_that_came_alone_is_refused(suffix: str, tmp_path: Path) -> None:
     """Without its table all heights would be guesses, as of a map that has none."""
     path = tmp_path / "town [1].shp"
-    for each in {".shp", ".SHX", ".dbf", ".shx"} - {suffix, suffix.upper()}:
-        path.with_suffix(each).touch()
+    for suffix_of_file in {".shp", ".SHX", ".dbf", ".shx"} - {suffix, suffix.upper()}:
+        path.with_suffix(suffix_of_file).touch()
     with pytest.raises(BlastEnvError, match=f"several files, of which {suffix} must lie beside it"):
         import_site(path, OPTIONS)
 
