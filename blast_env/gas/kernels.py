@@ -340,6 +340,23 @@ def _ratio_at(gas: Any, axis: int, along: bool, m: int) -> Any:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
+def _flux_through(
+    state: Any, code: int, at: int, apart: int, left: Any, right: Any, is_clear: bool, fuel: bool
+) -> Any:
+    """Return the flux through the low faces of a vector; behind a wall is the mirrored gas."""
+    wall = fill(state, 0.0)
+    if not is_clear:
+        side_left = load_codes(state, code, at - apart)
+        side_right = load_codes(state, code, at)
+        left, right = (
+            _ghost(side_left == wall, left, right, side_left),
+            _ghost(side_right == wall, right, left, side_right),
+        )
+        wall = side_left + side_right
+    return _hllc(state, left, right, wall, fuel)
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _sweep_run(
     gas: Any,
     begin: int,
@@ -399,18 +416,8 @@ def _sweep_run(
             below, above = _at_faces(state, low, here, high, per_r, ratio, fuel)
         # 2. The fluxes through the low faces; along x, the last ones are those of still air.
         if m < end or not along:
-            left, right, wall = above_before, below, zero
-            if along:
-                left = one_lower(above_before, above)
-            if not is_clear:
-                side_left = load_codes(state, code, at - apart)
-                side_right = load_codes(state, code, at)
-                left, right = (
-                    _ghost(side_left == zero, left, right, side_left),
-                    _ghost(side_right == zero, right, left, side_right),
-                )
-                wall = side_left + side_right
-            flux = _hllc(state, left, right, wall, fuel)
+            left = one_lower(above_before, above) if along else above_before
+            flux = _flux_through(state, code, at, apart, left, below, is_clear, fuel)
             _record_walls(flux[1], vectors + at // lanes_at(state), recorded, work)
         # 3. The vector before this one, all of whose fluxes are known now.
         if m > first:

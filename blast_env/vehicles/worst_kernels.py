@@ -126,17 +126,10 @@ def worst_against(
     x, lattice_x = plane_of(boxes, level, half, ends[0], steps[0], 0)
     y, lattice_y = plane_of(boxes, level, half, ends[1], steps[1], 1)
     _, reached, clear = reached_parts(x, y, closed, solid, starts)
-    # 1. The places, row by row, with the squares of their distances from the nearest wall.
-    of_column, of_row = _parts(x, lattice_x), _parts(y, lattice_y)
-    places_m = np.empty((len(lattice_x) * len(lattice_y), 2))
-    count = 0
-    for row in range(len(lattice_y)):
-        for column in range(len(lattice_x)):
-            part = of_row[row], of_column[column]
-            if reached[part] and clear[part]:
-                places_m[count, 0] = lattice_x[column] / per_m
-                places_m[count, 1] = lattice_y[row] / per_m
-                count += 1
+    # 1. The places, with the squares of their distances from the nearest wall.
+    is_open = reached & clear
+    places_m = _open_places(x, y, lattice_x, lattice_y, is_open, per_m)
+    count = len(places_m)
     nearest_m2 = np.full(count, inf)
     for wall in range(len(walls_m)):
         left, bottom, right, top = walls_m[wall]
@@ -171,6 +164,28 @@ def worst_against(
             if apart_m2 <= apart_m * apart_m * (1.0 + _NEAR) and hypot(along_x, along_y) < apart_m:
                 nearest_m2[place] = inf
     return chosen_m, distances_m
+
+
+@njit(error_model="numpy")
+def _open_places(
+    x: IntArray,
+    y: IntArray,
+    lattice_x: IntArray,
+    lattice_y: IntArray,
+    is_open: BoolArray,
+    per_m: float,
+) -> FloatArray:
+    """Return the points of a lattice that lie in open parts of a plane, row by row (places, 2)."""
+    of_column, of_row = _parts(x, lattice_x), _parts(y, lattice_y)
+    places_m = np.empty((len(lattice_x) * len(lattice_y), 2))
+    count = 0
+    for row in range(len(lattice_y)):
+        for column in range(len(lattice_x)):
+            if is_open[of_row[row], of_column[column]]:
+                places_m[count, 0] = lattice_x[column] / per_m
+                places_m[count, 1] = lattice_y[row] / per_m
+                count += 1
+    return places_m[:count]
 
 
 @njit(error_model="numpy")
