@@ -91,9 +91,7 @@ def heaped(env: BlastBarrierEnv, action: int) -> Layout:
     return state.layout
 
 
-def repeated(
-    env: BlastBarrierEnv, seeds: Sequence[int], lines: int = 4
-) -> dict[str, Estimate]:
+def repeated(env: BlastBarrierEnv, seeds: Sequence[int], lines: int = 4) -> dict[str, Estimate]:
     """Return the mean reductions of single actions, repeated to the end: as heaps and as walls.
 
     Args:
@@ -103,8 +101,7 @@ def repeated(
     """
     catalogue = env.task.source.representative.zone.catalogue
     rows, columns = (
-        np.linspace(0, side - 1, lines + 2).round().astype(int)[1:-1]
-        for side in catalogue.shape
+        np.linspace(0, side - 1, lines + 2).round().astype(int)[1:-1] for side in catalogue.shape
     )
     found: dict[str, list[float]] = {"heaps": [], "walls": []}
     for place in product(range(len(catalogue.variants)), rows, columns):
