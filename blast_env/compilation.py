@@ -4,6 +4,7 @@ import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -62,6 +63,7 @@ def _source_digest(function: FunctionType) -> str:
     return digest.hexdigest()
 
 
+@dataclass
 class _Sources:
     """The files of functions and types, and the values of constants, that a function uses.
 
@@ -71,11 +73,10 @@ class _Sources:
         constants: Names and values of the constants, in order of their use.
     """
 
-    def __init__(self, package: str) -> None:
-        self.package = package
-        self.paths: set[Path] = set()
-        self.constants: list[str] = []
-        self._seen: set[int] = set()
+    package: str
+    paths: set[Path] = field(default_factory=set)
+    constants: list[str] = field(default_factory=list)
+    _seen: set[int] = field(default_factory=set)
 
     def add(self, value: Any, name: str = "") -> None:
         """Add what a name in a compiled function stands for, and all that this uses in turn."""
@@ -111,9 +112,9 @@ class _Sources:
                 self._add_names(constant, names)
 
 
+@dataclass(eq=False)
 class _Listener(event.Listener):
-    def __init__(self, compiled: str) -> None:
-        self.compiled = compiled
+    compiled: str
 
     def on_start(self, _event: Any) -> None:
         _announce(self.compiled)

@@ -93,7 +93,8 @@ class Rectangle(NamedTuple):
 
     def scaled(self, factor: float) -> "Rectangle":
         """Return the rectangle with all coordinates multiplied by `factor`."""
-        return Rectangle(*(factor * value for value in self))
+        left, bottom, right, top = self
+        return Rectangle(factor * left, factor * bottom, factor * right, factor * top)
 
     def contains(self, other: "Rectangle") -> bool:
         """Whether `other` lies inside; sides may touch."""

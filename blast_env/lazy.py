@@ -24,7 +24,8 @@ def on_first_use(package: str) -> tuple[Callable[[str], object], Callable[[], li
             tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
             for node in ast.walk(tree):
                 if isinstance(node, ast.ImportFrom) and node.module:
-                    places.update((alias.name, node.module) for alias in node.names)
+                    for alias in node.names:
+                        places[alias.name] = node.module
         return places
 
     def get(name: str) -> object:

@@ -202,7 +202,7 @@ def test_the_air_is_as_high_as_what_can_stand_there_needs(
 def test_the_zone_has_two_levels_and_no_piece_is_on_both() -> None:
     placement = LayoutState.empty(terraced())
     assert placement.usable.all()
-    assert placement.ground_m.tolist() == [[0.0] * 4 + [1.0] * 4] * 14
+    assert placement.empty_zone.ground_m.tolist() == [[0.0] * 4 + [1.0] * 4] * 14
     across, along, post = placement.legal
     assert np.flatnonzero(across.any(axis=0)).tolist() == [0, 4]
     assert along.any(axis=0).all()
@@ -234,7 +234,7 @@ def test_a_terrace_of_any_outline_carries_what_lies_wholly_on_it() -> None:
     disc = column("mound", 6.0, 6.0, 4.0)
     flat = {key: value for key, value in HALL.items() if key != "base_m"}
     scenario = terraced(structures=[flat, disc | {"height_m": 1.0, "carries": True}])
-    ground = LayoutState.empty(scenario).ground_m
+    ground = LayoutState.empty(scenario).empty_zone.ground_m
     modules = sum(structure.modules for structure in scenario.structures if structure.carries)
     assert int(ground.sum()) == modules
 

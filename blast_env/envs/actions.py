@@ -128,20 +128,13 @@ class Actions(Protocol):
             to the line of sight is taken.
         """
 
-    def code(self, catalogue: Catalogue, count: int) -> ActionCode:
-        """Return how agents write the actions, of which there are `count`."""
-
-
-class _AsNumbers:
-    """Actions that agents write as numbers."""
-
     def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
-        """Return their numbers."""
+        """Return how agents write the actions, of which there are `count`: as numbers."""
         return Numbers(count)
 
 
 @dataclass(frozen=True)
-class PlaceAtOnce(_AsNumbers):
+class PlaceAtOnce(Actions):
     """One action per placement: a variant and its lower left cell, as `Catalogue` numbers them."""
 
     def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
@@ -164,7 +157,7 @@ class PlaceByDimensions(PlaceAtOnce):
 
 
 @dataclass(frozen=True)
-class ItemThenPlace(_AsNumbers):
+class ItemThenPlace(Actions):
     """First the variant (an item in one orientation), then the place of its lower left cell.
 
     In a zone without a catalogue only the place is chosen.
@@ -197,7 +190,7 @@ class ItemThenPlace(_AsNumbers):
 
 
 @dataclass(frozen=True)
-class RowAcrossSight(_AsNumbers):
+class RowAcrossSight(Actions):
     """The variant and a row of cells across the line of sight, without the place in it.
 
     A row is a column or a row of the build zone: whichever lies more across the line from the mean

@@ -1,7 +1,7 @@
 """Checks of the arguments of environments and the options of `reset`, kept as plain data."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial, wraps
 from inspect import signature
@@ -29,7 +29,7 @@ def checked_keywords(
     Keywords to `gymnasium.make` escape type checkers, and the error of Python does not suggest the
     nearest keyword; this one does.
     """
-    known = [name for name in signature(function).parameters if name != "self"]
+    _, *known = signature(function).parameters  # without `self`
 
     @wraps(function)
     def checked(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Returned:
@@ -99,11 +99,11 @@ def strategy(
 
 def _common_methods(strategies: Iterable[object]) -> list[str]:
     """Return the public methods common to all the strategies, and `__call__` if they have it."""
-    of_each = [
+    methods = [
         {name for name in dir(strategy) if callable(getattr(strategy, name))}
         for strategy in strategies
     ]
-    common = set.intersection(*of_each)
+    common = set.intersection(*methods)
     return sorted(name for name in common if name == "__call__" or not name.startswith("_"))
 
 
@@ -154,22 +154,23 @@ class ResetOptions:
             UnknownNameError: If there is no such option; the message has the nearest one.
             BlastEnvError: If the value of an option is invalid.
         """
-        options = checked_options(options, [field.name for field in fields(cls)])
         checks: dict[str, Callable[[str, Any], Any]] = {
             "charge_position_m": number_pair,
             "tnt_kg": finite_number,
             "charge_height_m": finite_number,
             "blast_seed": partial(whole_number, least=0, most=_MOST_BLAST_SEED),
         }
-        given = {name: check for name, check in checks.items() if options.get(name) is not None}
-        fixed = {name: check(name, options[name]) for name, check in given.items()}
+        options = checked_options(options, (*checks, "layout"))
+        fixed = {}
+        for name, check in checks.items():
+            if options.get(name) is not None:
+                fixed[name] = check(name, options[name])
         return cls(layout=options.get("layout", ()), **fixed)
 
     @property
     def fix_charge(self) -> bool:
         """Whether any property of the charge is fixed."""
-        fixed = (self.charge_position_m, self.tnt_kg, self.charge_height_m)
-        return any(item is not None for item in fixed)
+        return (self.charge_position_m, self.tnt_kg, self.charge_height_m) != (None, None, None)
 
     def charge(self, drawn: AnyCharge) -> AnyCharge:
         """Return a drawn charge with its fixed properties replaced.

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.episode import Episode
-from blast_env.envs.observable import VehicleView
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
@@ -144,7 +143,7 @@ class Display:
         painter, lines = self._placing_painter(episode), _state_lines(episode, placement)
         if not episode.ended:
             return painter.paint(placement, lines)
-        if episode.evaluator.engine.medium != "particles":  # no state that stays
+        if episode.site.evaluator.engine.medium != "particles":  # no state that stays
             return painter.paint(placement, [*lines[:1], _outcome(episode)])
         if self._last_frame is None:
             self._last_frame = _last_frame(episode, painter.size_px)
@@ -174,7 +173,7 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
     """Return the end of the blast of the worst threat, which runs again for the picture."""
     from blast_env.plots.placing import last_frame
 
-    shown, evaluator = _shown_threat(episode), episode.evaluator
+    shown, evaluator = _shown_threat(episode), episode.site.evaluator
     # Sorted as for the assessment: the order may change the last bits.
     layout = tuple(sorted(episode.final or ()))
     charges = len(episode.case.charges)
@@ -187,7 +186,7 @@ def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
 def _shown_threat(episode: Episode) -> LoadCase:
     """Return the worst threat, with its first realisation."""
     case, layout = episode.case, episode.final or ()
-    blasts = episode.evaluator.loads_of_many([(layout, threat) for threat in case.threats])
+    blasts = episode.site.evaluator.loads_of_many([(layout, threat) for threat in case.threats])
     loads = np.array([blast.load(case.scenario.objective) for blast in blasts])
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
@@ -214,9 +213,9 @@ def _state_lines(episode: Episode, placement: LayoutState) -> list[str]:
     extras = [f"{count} {name}" for name, count in left if count]
     if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
-    vehicles = VehicleView.of(placement.scenario, episode.shown.observable.sources)
-    if vehicles.vehicles:
-        extras.append(f"stand-off {vehicles.stand_off_m(placement.layout):.1f} m")
+    observable = episode.shown.observable
+    if observable.vehicles:
+        extras.append(f"stand-off {observable.stand_off_m(placement.layout):.1f} m")
     if episode.invalid_actions:
         plural = "" if episode.invalid_actions == 1 else "s"
         extras.append(f"{episode.invalid_actions} illegal action{plural}")

@@ -113,10 +113,6 @@ class Task:
     store: BlastStore
     counts: BlastCounts = field(default_factory=BlastCounts)
 
-    def evaluator(self, scenario: Scenario) -> BlastEvaluator:
-        """Return what runs the blasts of a site; see `BlastEvaluator` for errors."""
-        return BlastEvaluator(scenario, self.engine, cache=self.store, counts=self.counts)
-
     def case(
         self,
         scenario: Scenario,
@@ -178,12 +174,13 @@ class _Site:
         """Return the common parts of a site.
 
         Raises:
-            BlastEnvError: If the scenario has another size than the representative one.
+            BlastEnvError: If the scenario has another size than the representative one, or the
+                engine does not suit it.
         """
         check_size(scenario, task.source.representative)
         empty = LayoutState.empty(scenario)
         return cls(
-            task.evaluator(scenario),
+            BlastEvaluator(scenario, task.engine, cache=task.store, counts=task.counts),
             empty,
             PlacementRules.of(empty),
             ActionNumbers.of(task.actions, scenario),
@@ -251,11 +248,6 @@ class Episode:
         """Whether the charge has gone off."""
         return self.final is not None
 
-    @property
-    def evaluator(self) -> BlastEvaluator:
-        """What runs its blasts."""
-        return self.site.evaluator
-
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return the loads with the final layout and without a barrier."""
         assert self.final is not None
@@ -285,14 +277,14 @@ class Episode:
         if self.final is None:
             return self.site.no_outcome(len(self.shown.charges))
         charges = self.case.charges_against(self.final)
-        return _outcome(self.evaluator, *self.assess(), charges)
+        return _outcome(self.site.evaluator, *self.assess(), charges)
 
     @cached_property
     def constants(self) -> Mapping[str, Any]:
         """The information that does not change in the episode."""
         return {
-            "scenario_hash": self.evaluator.scenario_hash,
-            "calibration": self.evaluator.calibration_name,
+            "scenario_hash": self.site.empty.scenario.content_hash,
+            "calibration": self.site.evaluator.calibration_name,
             "blast_seeds": tuple(map(tuple, self.seeds.tolist())),
         }
 
@@ -551,7 +543,7 @@ class Episodes:
             return
         # 3. One batch of blasts, and the loads back to their episodes in the same order.
         asked = [
-            (episode.evaluator, layout, threat)
+            (episode.site.evaluator, layout, threat)
             for episode, layout in due
             for threat in episode.case.threats
         ]
@@ -684,7 +676,7 @@ class Episodes:
         if known is None:
             return False
         episode.loads[()] = known
-        episode.evaluator.counts.cache_hits += episode.seeds.size
+        episode.site.evaluator.counts.cache_hits += episode.seeds.size
         return True
 
     def site_of(self, scenario: Scenario) -> _Site:

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import Any, Final, Protocol
 
@@ -22,7 +23,6 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.zone import module_costs_of
-from blast_env.vehicles.reach import squares_of
 
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""
@@ -66,29 +66,14 @@ class Observable:
         """Whether observations have values for vehicles."""
         return self.among_vehicles or bool(self.scenario.vehicles)
 
-
-@dataclass(frozen=True)
-class VehicleView:
-    """The observable vehicles.
-
-    Attributes:
-        scenario: The scenario.
-        vehicles: The vehicles that may bring the charge.
-    """
-
-    scenario: Scenario
-    vehicles: tuple[VehicleSource, ...]
-
-    @classmethod
-    def of(cls, scenario: Scenario, sources: tuple[AnySource, ...]) -> "VehicleView":
-        """Return the vehicles among the sources of a charge."""
-        return cls(
-            scenario, tuple(source for source in sources if isinstance(source, VehicleSource))
-        )
+    @cached_property
+    def vehicles(self) -> tuple[VehicleSource, ...]:
+        """The vehicles that may bring the charge."""
+        return tuple(source for source in self.sources if isinstance(source, VehicleSource))
 
     def reached(self, layout: Layout) -> BoolArray:
         """Return the mask of squares of the site within reach of a vehicle, (rows, columns)."""
-        rows, columns = squares_of(self.scenario.site)
+        rows, columns = self.scenario.site.squares
         ground = np.zeros((rows, columns), dtype=bool)
         for source in self.vehicles:
             ground |= vehicle_reach(self.scenario, source, layout).ground(rows, columns)

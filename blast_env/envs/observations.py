@@ -17,7 +17,6 @@ from blast_env.envs.observable import (
     Observable,
     Observation,
     Plane,
-    VehicleView,
     charge_share,
     cost_shares,
     height_share,
@@ -139,8 +138,7 @@ class FeaturesObservation:
         return FeaturesEpisode(
             np.clip(constants, 0.0, 1.0).astype(np.float32),
             variant_values(zone),
-            VehicleView.of(scenario, observable.sources),
-            observable.shows_vehicles,
+            observable,
         )
 
 
@@ -152,14 +150,13 @@ class FeaturesEpisode(BatchObservation):
         constants: Values that no layout changes: charge, corner and structures (56,), costs of
             cells (cells,) and, with a catalogue, heights of structures, heights and costs of items.
         variants: Values of cells by the variant on them; see `variant_values`.
-        vehicles: The observable vehicles.
-        shows_vehicles: Whether the stand-off is the last value; 1 without a vehicle.
+        observable: The observable part of the episode, whose stand-off is the last value if it
+            shows vehicles; 1 without a vehicle.
     """
 
     constants: Plane
     variants: Plane
-    vehicles: VehicleView
-    shows_vehicles: bool
+    observable: Observable
 
     @staticmethod
     def observe_many(episodes: Sequence["FeaturesEpisode"], placements: Placements) -> Array:
@@ -180,12 +177,12 @@ class FeaturesEpisode(BatchObservation):
         length = shares.shape[1] + constants.shape[1] + 2 * rows * columns
         if has_items:
             length += (2 + kinds) * rows * columns
-        shows_vehicles = episodes[0].shows_vehicles
+        shows_vehicles = episodes[0].observable.shows_vehicles
         vectors = placements.room((len(episodes), length + shows_vehicles))
         of_episodes = own, constants, variants, shares, legal, occupancy, has_items
         put_vectors(*of_episodes, _SHARES, _SITE, vectors)
         if shows_vehicles:
-            stand_offs = _stand_offs([episode.vehicles for episode in episodes], placements)
+            stand_offs = _stand_offs([episode.observable for episode in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
         return vectors
 
@@ -267,8 +264,7 @@ class DictObservation:
         return DictEpisode(
             self.planes.episode(observable),
             np.concatenate((_charge_and_corner(scenario, sources), *items)),
-            VehicleView.of(scenario, sources),
-            observable.shows_vehicles,
+            observable,
         )
 
 
@@ -279,14 +275,13 @@ class DictEpisode(BatchObservation):
     Attributes:
         planes: The images of the episode.
         site: Values of charge, corner of the build zone and items.
-        vehicles: The observable vehicles.
-        shows_vehicles: Whether the stand-off is the last value.
+        observable: The observable part of the episode, whose stand-off is the last value if it
+            shows vehicles.
     """
 
     planes: ImageEpisode
     site: FloatArray
-    vehicles: VehicleView
-    shows_vehicles: bool
+    observable: Observable
 
     @staticmethod
     def observe_many(episodes: Sequence["DictEpisode"], placements: Placements) -> dict[str, Array]:
@@ -294,8 +289,8 @@ class DictEpisode(BatchObservation):
         parts = [stock_shares(placements), np.array([episode.site for episode in episodes])]
         if placements.rules[0].catalogue.has_items:
             parts.append(items_left(placements))
-        if episodes[0].shows_vehicles:
-            parts.append(_stand_offs([episode.vehicles for episode in episodes], placements))
+        if episodes[0].observable.shows_vehicles:
+            parts.append(_stand_offs([episode.observable for episode in episodes], placements))
         planes = ImageEpisode.observe_many([episode.planes for episode in episodes], placements)
         return {"planes": planes, "vector": _joined(parts)}
 
@@ -313,14 +308,12 @@ def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> Fl
     )
 
 
-def _stand_offs(vehicles: Sequence[VehicleView], placements: Placements) -> FloatArray:
+def _stand_offs(episodes: Sequence[Observable], placements: Placements) -> FloatArray:
     """Return the stand-off of each episode as a share of the site's diagonal (episodes, 1)."""
     shares = []
-    for position, vehicle in enumerate(vehicles):
-        site = vehicle.scenario.site
-        shares.append(
-            vehicle.stand_off_m(placements.layout(position)) / hypot(site.width_m, site.height_m)
-        )
+    for position, episode in enumerate(episodes):
+        site, layout = episode.scenario.site, placements.layout(position)
+        shares.append(episode.stand_off_m(layout) / hypot(site.width_m, site.height_m))
     return np.array(shares)[:, np.newaxis]
 
 

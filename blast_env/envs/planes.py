@@ -15,7 +15,6 @@ from blast_env.envs.observable import (
     BatchObservation,
     Observable,
     Plane,
-    VehicleView,
     cells_shown,
     charge_share,
     cost_shares,
@@ -33,18 +32,16 @@ from blast_env.site import (
     Catalogue,
     RectangleSource,
     Scenario,
-    Site,
 )
 from blast_env.site.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.reach import squares_of
 
 _POINTS_PER_MODULE: Final = 8  # along a line of possible places of a charge
 
 
 @dataclass(frozen=True)
 class SiteGrid:
-    """Planes of (rows, columns) squares of 0.5 m; row 0 is the lower edge of the site.
+    """Planes of (rows, columns) squares of 0.5 m, as of `Site.squares`; row 0 is the lower edge.
 
     Attributes:
         rows: Number of squares upwards.
@@ -53,11 +50,6 @@ class SiteGrid:
 
     rows: int
     columns: int
-
-    @classmethod
-    def of(cls, site: Site) -> "SiteGrid":
-        """Return the grid of a site; its last squares may extend beyond the site."""
-        return cls(*squares_of(site))
 
     def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
         """Return the position of a lattice of modules on the grid.
@@ -98,10 +90,7 @@ class SiteGrid:
         length_m = float(np.hypot(*(end - start)))
         count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
         share = (np.arange(count) + 0.5) / count
-        return self._points(start + share[:, np.newaxis] * (end - start))
-
-    def _points(self, points_m: NDArray[np.float64]) -> Plane:
-        """Return a plane of points (n, 2), each distributed over the four squares around it."""
+        points_m = start + share[:, np.newaxis] * (end - start)
         plane = np.zeros((self.rows, self.columns), dtype=np.float32)
         # Cloud in cell: the shares of a point in the four squares around it are linear in its
         # offset from their centres, so that their mean is the point (Hockney & Eastwood, Computer
@@ -276,18 +265,17 @@ class GridObservation:
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (channels, rows, columns)."""
-        shape = (len(self.channels_of(scenario)), *squares_of(scenario.site))
+        shape = (len(self.channels_of(scenario)), *scenario.site.squares)
         return spaces.Box(0.0, 1.0, shape, np.float32)
 
     def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change."""
         scenario, zone = observable.scenario, observable.scenario.zone
-        grid = SiteGrid.of(scenario.site)
+        grid = SiteGrid(*scenario.site.squares)
         channels = self.channels_of(scenario, observable.shows_vehicles)
         static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
         lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
-        vehicles = VehicleView.of(scenario, observable.sources)
-        episode = GridEpisode(static, lattice, channels, vehicles)
+        episode = GridEpisode(static, lattice, channels, observable)
         protected, others, heights = _structure_planes(grid, scenario)
         costs = lattice.plane(cost_shares(zone))
         charge = _charge_plane(grid, observable.sources)
@@ -298,7 +286,7 @@ class GridObservation:
             for ending, values in zip((":height", ":cost"), item_values(zone), strict=True):
                 episode.show(static, episode.ending(ending), values)
         if scenario.vehicles:
-            episode.show(static, (EMPTY_REACH,), vehicles.reached(())[np.newaxis])
+            episode.show(static, (EMPTY_REACH,), observable.reached(())[np.newaxis])
         return episode
 
 
@@ -310,13 +298,13 @@ class GridEpisode(BatchObservation):
         static: The constant planes (channels, rows, columns), 255 for 1; the others are 0.
         zone: Position of the build zone on the grid.
         channels: Names of the planes.
-        vehicles: The observable vehicles.
+        observable: The observable part of the episode.
     """
 
     static: NDArray[np.uint8]
     zone: Lattice
     channels: tuple[str, ...]
-    vehicles: VehicleView
+    observable: Observable
 
     @staticmethod
     def observe_many(episodes: Sequence["GridEpisode"], placements: Placements) -> Plane:
@@ -359,7 +347,7 @@ class GridEpisode(BatchObservation):
             else:
                 own[numbers, *episode.zone.squares] = of_cells
             if REACH in channels:
-                reached = episode.vehicles.reached(placements.layout(position))
+                reached = episode.observable.reached(placements.layout(position))
                 own[channels.index(REACH)] = _levels(reached)
 
     def ending(self, ending: str) -> tuple[str, ...]:
@@ -441,7 +429,7 @@ class ImageObservation:
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (height, width, channels)."""
-        rows, columns = squares_of(scenario.site)
+        rows, columns = scenario.site.squares
         channels = len(self.planes.channels_of(scenario))
         least = max(LEAST_IMAGE_SIDE, channels + 1)
         return spaces.Box(0, 255, (max(rows, least), max(columns, least), channels), np.uint8)

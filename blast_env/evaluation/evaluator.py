@@ -8,7 +8,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from hashlib import sha256
 from math import nan
 from operator import attrgetter
 from pathlib import Path
@@ -105,15 +104,10 @@ class BlastEvaluator:
             charge=Charge((0.0, 0.0), 0.0),
             seed=0,
             engine=engine_text(self.engine),
-            calibration="" if self.calibration is None else calibration_digest(self.calibration),
+            calibration="" if self.calibration is None else self.calibration.digest,
             code=code_version(),
             parts=parts_digest(self.scenario),
         )
-
-    @property
-    def scenario_hash(self) -> str:
-        """Content hash of the scenario, computed once."""
-        return self.scenario.content_hash
 
     @property
     def calibration_name(self) -> str:
@@ -324,11 +318,6 @@ def engine_text(engine: Engine) -> str:
     kind = f"{type(engine).__module__}.{type(engine).__qualname__}"
     fields = repr(engine) if dataclasses.is_dataclass(engine) else ""
     return f"{kind} {engine.name} {engine.version} {fields}".rstrip()
-
-
-def calibration_digest(calibration: Calibration) -> str:
-    """Return the SHA-256 of a calibration, which distinguishes versions of the same name."""
-    return sha256(calibration.model_dump_json().encode()).hexdigest()
 
 
 _MOST_EVALUATORS: Final = 4

@@ -54,14 +54,14 @@ class PlacementRules:
     @classmethod
     def of(cls, start: LayoutState) -> "PlacementRules":
         """Return the rules on the site of a layout."""
-        scenario, catalogue = start.scenario, start.catalogue
-        dearest = float(start.costs[start.fits].max(initial=0.0))
+        scenario, empty = start.scenario, start.empty_zone
+        dearest = float(empty.costs[empty.fits].max(initial=0.0))
         variants = np.array(
-            [(variant.rows, variant.columns, variant.item) for variant in catalogue.variants],
+            [(variant.rows, variant.columns, variant.item) for variant in empty.catalogue.variants],
             dtype=np.int64,
         ).reshape(-1, 3)
         return cls(
-            *(scenario, scenario.zone, catalogue, start.costs, dearest, start.passable),
+            *(scenario, scenario.zone, empty.catalogue, empty.costs, dearest, empty.passable),
             variants,
         )
 
@@ -147,10 +147,10 @@ class LayoutBatch:
             indices: The layouts, different ones (n,).
             numbers: The number of the element in the catalogue, for each (n,).
         """
-        from blast_env.layout.batch_kernels import find_full, place  # Numba takes long to import
-
         if not len(indices):
             return
+        from blast_env.layout.batch_kernels import find_full, place  # Numba takes long to import
+
         indices, numbers = np.asarray(indices), np.asarray(numbers)
         self._numbers[indices, self.placed[indices]] = numbers
         self.placed[indices] += 1

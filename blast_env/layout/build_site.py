@@ -16,7 +16,7 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
-from blast_env.site.structures import AnyStructure, ConcreteSquareSection
+from blast_env.site.structures import ConcreteSquareSection
 from blast_env.site.terraces import ground_below_m
 from blast_env.values import checked_seed
 from blast_env.vehicles.crash_rating import NOTHING, Obstacles
@@ -35,8 +35,7 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     Raises:
         BlastEnvError: If the seed is not an integer, is negative or too large.
     """
-    children = np.random.SeedSequence(checked_seed(seed)).spawn(3)
-    return tuple(np.random.default_rng(child) for child in children)
+    return tuple(map(np.random.default_rng, np.random.SeedSequence(checked_seed(seed)).spawn(3)))
 
 
 def draw_charge(scenario: Scenario, seed: int) -> Charge:
@@ -110,14 +109,17 @@ def build_site(
     layout: Sequence[Element] = (),
     seed: int = 0,
     charge: AnyCharge | None = None,
+    *,
+    with_zone: bool = True,
 ) -> BlastSite:
-    """Return the site of one blast, for an engine without particles.
+    """Return the site of one blast.
 
     Args:
         scenario: The scenario.
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
         seed: Seed of the charge if the scenario has several; the same charge as for particles.
         charge: The charge, instead of one drawn from the scenario.
+        with_zone: Whether to give the whole build zone, too, which only gas dynamics needs.
 
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
@@ -141,7 +143,7 @@ def build_site(
         structures=structures,
         gauges=tuple(Gauge(gauge.name, gauge.position_m) for gauge in scenario.gauges),
         air_height_m=scenario.air_height_m,
-        build_zone=None if scenario.build_zone is None else _whole(scenario),
+        build_zone=_whole(scenario) if with_zone and scenario.build_zone is not None else None,
     )
 
 
@@ -159,31 +161,28 @@ def _check_clear(scenario: Scenario, layout: Layout) -> None:
 def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
     """Return the outlines of the structures that remain with a layout."""
     zone = scenario.build_zone
-    may_go = frozenset() if zone is None else zone.may_be_taken_away
-    return tuple(
-        _outline(structure, is_lasting=structure.name not in may_go)
-        for structure in scenario.structures_with(layout)
-    )
-
-
-def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
-    is_square = isinstance(section, ConcreteSquareSection)
-    return StructureOutline(
-        kind="ConcreteSquare" if is_square else "ModularObstacle",
-        name=section.name,
-        corner_m=section.corner_m,
-        rows=section.rows,
-        columns=section.columns,
-        protected=section.protected,
-        weight=section.weight,
-        cells=section.cells,
-        capacity=section.module_capacity,
-        height_m=section.height_m,
-        faces=section.faces,
-        base_m=section.base_m,
-        is_lasting=is_lasting,
-        footprint=section.footprint,
-    )
+    may_go = frozenset[str]() if zone is None else zone.may_be_taken_away
+    found = []
+    for section in scenario.structures_with(layout):
+        is_square = isinstance(section, ConcreteSquareSection)
+        outline = StructureOutline(
+            kind="ConcreteSquare" if is_square else "ModularObstacle",
+            name=section.name,
+            corner_m=section.corner_m,
+            rows=section.rows,
+            columns=section.columns,
+            protected=section.protected,
+            weight=section.weight,
+            cells=section.cells,
+            capacity=section.module_capacity,
+            height_m=section.height_m,
+            faces=section.faces,
+            base_m=section.base_m,
+            is_lasting=section.name not in may_go,
+            footprint=section.footprint,
+        )
+        found.append(outline)
+    return tuple(found)
 
 
 def _whole(scenario: Scenario) -> StructureOutline:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray, FloatArray
+from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle, standing
 from blast_env.site.catalogue import Catalogue, ModulePlace, cell_text, element_text
@@ -22,7 +22,6 @@ from blast_env.site.zone import (
     NO_ZONE,
     BuildZone,
     EmptyZone,
-    Surroundings,
     empty_zone,
     reason_against,
     reasons_against,
@@ -112,7 +111,7 @@ class LayoutState:
         # Deriving them anew would double the time of a step of the environment.
         occupancy = self.occupancy.copy()
         self._stand(occupancy, element)
-        vars(placed).update(_empty_zone=self._empty_zone, occupancy=occupancy)
+        vars(placed).update(empty_zone=self.empty_zone, occupancy=occupancy)
         return placed
 
     def _is_known_legal(self, element: Element) -> bool:
@@ -146,7 +145,7 @@ class LayoutState:
 
     def reasons_against(self, cells: BoolArray) -> dict[str, int]:
         """Return the reasons why cells of a mask are not usable, with the number of cells."""
-        return reasons_against(self._surroundings, cells)
+        return reasons_against(self.scenario.surroundings(self._zone), cells)
 
     def explain_vehicles(self) -> tuple[str, ...]:
         """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""
@@ -166,13 +165,13 @@ class LayoutState:
         (1, 0, 0) without a build zone.
         """
         # 1. Free and usable ground; 2. the budget; 3. the stock; 4. the access way.
-        cells, item_of = self._empty_zone, [variant.item for variant in self.catalogue.variants]
+        cells, item_of = self.empty_zone, [variant.item for variant in self.catalogue.variants]
         legal = cells.places(cells.usable & (self.occupancy == 0))
         if self._zone.budget is not None:
             legal &= cells.costs <= self._spendable
         in_stock = np.array(self.stocks_left)[item_of] > 0
         legal &= in_stock[:, np.newaxis, np.newaxis]
-        if self._closing is not None:
+        if self._zone.access_way is not None:
             legal &= ~self._closing
         legal.flags.writeable = False
         return legal
@@ -223,7 +222,7 @@ class LayoutState:
             possible: A subset of `legal`, of the same shape.
         """
         limited = LayoutState(self.scenario, self.layout)
-        vars(limited).update(_empty_zone=self._empty_zone, occupancy=self.occupancy, legal=possible)
+        vars(limited).update(empty_zone=self.empty_zone, occupancy=self.occupancy, legal=possible)
         return limited
 
     def places(self, cells: BoolArray) -> BoolArray:
@@ -235,7 +234,12 @@ class LayoutState:
         Returns:
             Shape (variants, rows, columns), without regard to the layout, stock and budget.
         """
-        return self._empty_zone.places(cells)
+        return self.empty_zone.places(cells)
+
+    @cached_property
+    def empty_zone(self) -> EmptyZone:
+        """The build zone without modules."""
+        return empty_zone(self.scenario.surroundings(self._zone))
 
     @property
     def usable(self) -> BoolArray:
@@ -243,40 +247,17 @@ class LayoutState:
 
         Shape (rows, columns), without regard to layout, stock, budget and access way.
         """
-        return self._empty_zone.usable
-
-    @property
-    def fits(self) -> BoolArray:
-        """Whether each variant may be placed on the empty site (variants, rows, columns)."""
-        return self._empty_zone.fits
-
-    @property
-    def passable(self) -> BoolArray:
-        """Whether each cell is free of structures without a passage (rows, columns)."""
-        return self._empty_zone.passable
-
-    @property
-    def ground_m(self) -> FloatArray:
-        """Height of the ground of each cell, m (rows, columns), read-only."""
-        return self._empty_zone.ground_m
-
-    @property
-    def module_costs(self) -> NDArray[np.float64]:
-        """Cost of a module on each cell, shape (rows, columns), read-only.
-
-        With a catalogue, the factor of an item's cost there.
-        """
-        return self._empty_zone.module_costs
+        return self.empty_zone.usable
 
     @property
     def costs(self) -> NDArray[np.float64]:
         """Cost of each variant by its lower left cell (variants, rows, columns), read-only."""
-        return self._empty_zone.costs
+        return self.empty_zone.costs
 
     @property
     def catalogue(self) -> Catalogue:
         """The catalogue, which numbers the actions."""
-        return self._empty_zone.catalogue
+        return self.empty_zone.catalogue
 
     @property
     def modules(self) -> tuple[ModulePlace, ...]:
@@ -308,14 +289,14 @@ class LayoutState:
         if not catalogue.has_items:
             return (most,)
         placed = Counter(element.item for element in self.layout if isinstance(element, Piece))
-        each_left = zip(catalogue.stocks, catalogue.names, strict=True)
-        return tuple(min(stock - placed[name], most) for stock, name in each_left)
+        left = zip(catalogue.stocks, catalogue.names, strict=True)
+        return tuple(min(stock - placed[name], most) for stock, name in left)
 
     @cached_property
     def cost(self) -> float:
         """Total cost of the layout."""
         # Summed exactly, so that the order of the layout does not matter.
-        costs = self._empty_zone.costs
+        costs = self.empty_zone.costs
         number = self.catalogue.variant_number
         return fsum(costs[number(element), element[0], element[1]] for element in self.layout)
 
@@ -340,15 +321,6 @@ class LayoutState:
         """Largest cost of the next element."""
         return self._zone.cost_limit - self.cost
 
-    @cached_property
-    def _empty_zone(self) -> EmptyZone:
-        """The build zone without modules."""
-        return empty_zone(self._surroundings)
-
-    @property
-    def _surroundings(self) -> Surroundings:
-        return self.scenario.surroundings(self._zone)
-
     @property
     def _taken(self) -> BoolArray:
         """Whether each cell has a module (rows, columns)."""
@@ -356,12 +328,11 @@ class LayoutState:
         return taken
 
     @cached_property
-    def _closing(self) -> BoolArray | None:
-        """Whether each variant would close the access way (variants, rows, columns)."""
+    def _closing(self) -> BoolArray:
+        """Whether each variant would close the zone's access way (variants, rows, columns)."""
         way = self._zone.access_way
-        if way is None:
-            return None
-        passable = self._empty_zone.passable & ~self._taken
+        assert way is not None
+        passable = self.empty_zone.passable & ~self._taken
         return np.stack([*closing_places(way, passable, self.catalogue.sizes)])
 
     @property
@@ -379,11 +350,11 @@ class LayoutState:
             return False
         if not all(map(zone.has, self.cells)):
             return False
-        if self._spendable < 0.0 or not self._empty_zone.usable[self._taken].all():
+        if self._spendable < 0.0 or not self.empty_zone.usable[self._taken].all():
             return False
-        if len(self._empty_zone.levels) and any(map(self._straddles, self.layout)):
+        if len(self.empty_zone.levels) and any(map(self._straddles, self.layout)):
             return False
-        passable = self._empty_zone.passable & ~self._taken
+        passable = self.empty_zone.passable & ~self._taken
         return zone.access_way is None or is_open(zone.access_way, passable)
 
     def _reason_against_site(self, element: Element) -> str | None:
@@ -403,14 +374,14 @@ class LayoutState:
         if not zone.has(cells[-1]):
             return f"sticks out of {size}"
         for cell in cells:
-            if not self._empty_zone.usable[cell]:
-                reason = reason_against(self._surroundings, cell)
+            if not self.empty_zone.usable[cell]:
+                reason = reason_against(self.scenario.surroundings(self._zone), cell)
                 return _of_cell(element, cell, reason)
         return "would straddle the edge of a terrace" if self._straddles(element) else None
 
     def _straddles(self, element: Element) -> bool:
         """Return whether the ground below an element has several heights."""
-        ground = self._empty_zone.ground_m
+        ground = self.empty_zone.ground_m
         return len({ground[cell] for cell in self.catalogue.cells(element)}) > 1
 
     def _reason_against_taken(self, element: Element) -> str | None:
@@ -450,7 +421,7 @@ class LayoutState:
     def _reason_against_closing(self, element: Element) -> str | None:
         """Return the message of a closed access way, or `None` if it stays open."""
         way, number = self._zone.access_way, self.catalogue.variant_number(element)
-        if way is None or self._closing is None or not self._closing[number, *element[:2]]:
+        if way is None or not self._closing[number, *element[:2]]:
             return None
         return f"would close the {way.description}"
 

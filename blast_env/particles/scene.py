@@ -88,7 +88,7 @@ def build_scene(
         BlastEnvError: If the mass of the charge is out of bounds of the parameters.
         ValueError: If the seed is negative.
     """
-    base = build_site(scenario, layout, seed, charge)
+    base = build_site(scenario, layout, seed, charge, with_zone=False)
     if any(structure.base_m or structure.carries for structure in scenario.structures):
         scenario.check_for_particles()
     _check_not_over_a_roof(scenario, base.charge)
@@ -112,7 +112,6 @@ def build_scene(
         structures=base.structures,
         gauges=base.gauges,
         air_height_m=base.air_height_m,
-        build_zone=base.build_zone,
         parameters=parameters,
     )
 

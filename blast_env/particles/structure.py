@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -234,6 +235,7 @@ class ModularObstacle:
         """Create the parts."""
         # A grid row by row, from the lower left corner.
         half = MODULE_SIDE_UNITS / 2.0
+        every_cell = product(range(self.rows), range(self.columns))
         self.parts = [
             ModularPart(
                 structure=self.name,
@@ -244,7 +246,7 @@ class ModularObstacle:
                 capacity=self.capacity,
                 piece="" if self.pieces is None else self.pieces[number],
             )
-            for number, (row, column) in enumerate(self._used_cells())
+            for number, (row, column) in enumerate(every_cell if self.cells is None else self.cells)
         ]
 
     @property
@@ -295,11 +297,6 @@ class ModularObstacle:
     def transferred_impulse(self) -> float:
         """Sum of the momentum actually transferred to the modules, simulation units."""
         return float(sum(part.transferred_impulse for part in self.parts))
-
-    def _used_cells(self) -> Iterator[tuple[int, int]]:
-        if self.cells is not None:
-            return iter(self.cells)
-        return ((row, column) for row in range(self.rows) for column in range(self.columns))
 
 
 class ConcreteSquare(ModularObstacle):

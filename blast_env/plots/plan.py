@@ -37,7 +37,6 @@ from blast_env.site.terraces import ground_below_m, is_open_below, levels_of
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.drive import Impact
 from blast_env.vehicles.driving import WayPoint
-from blast_env.vehicles.reach import squares_of
 from blast_env.vehicles.worst_places import nearest_point_m
 
 PAGE: Final[Colour] = (255, 255, 255)
@@ -670,7 +669,7 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
     """
     found: list[Feature] = []
     for source in scenario.vehicles:
-        ground = vehicle_reach(scenario, source, layout).ground(*squares_of(scenario.site))
+        ground = vehicle_reach(scenario, source, layout).ground(*scenario.site.squares)
         found += (
             area_feature(Kinds.REACHED, rectangle, Kinds.REACHED.words)
             for rectangle in rectangles_of(ground)

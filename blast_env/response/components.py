@@ -25,8 +25,8 @@ from pydantic import (
 
 from blast_env.bays import Bay
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.hashing import HashMark
 from blast_env.response.wall_sections import Masonry, ReinforcedConcrete, Sheeting, Supports
+from blast_env.sections import HashMark
 from blast_env.values import plain_text
 
 PaneSide = Annotated[StrictFloat, Field(ge=0.05, le=20.0)]

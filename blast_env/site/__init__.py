@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from blast_env.bundled import bundled_scenarios
     from blast_env.geometry import Cell, Element, Layout, Piece
     from blast_env.problems import Problem, ScenarioError
-    from blast_env.sections import Site
+    from blast_env.sections import DrawingGeoreference, GaugeSection, MapGeoreference, Site
     from blast_env.site.blast_site import (
         OUTWARDS,
         WALLS,
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from blast_env.site.parameters import (
         ExplosiveParameters,
         SimulationParameters,
+        SimulationSection,
         for_charge,
         parameters_digest,
         preset,
@@ -53,12 +54,6 @@ if TYPE_CHECKING:
         with_resolution,
     )
     from blast_env.site.presets import MassPreset, tnt_equivalent_kg
-    from blast_env.site.sections import (
-        DrawingGeoreference,
-        GaugeSection,
-        MapGeoreference,
-        SimulationSection,
-    )
     from blast_env.site.sight import in_sight
     from blast_env.site.sources import (
         AnyCharge,

@@ -20,10 +20,8 @@ from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 from blast_env.bays import Bay
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
-from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError, unknown_name
-from blast_env.sections import FOR_PEOPLE, Height, Name, Section, SparseSection
-from blast_env.site.sections import Count
+from blast_env.sections import FOR_PEOPLE, Count, HashMark, Height, Name, Section, SparseSection
 from blast_env.site.structures import FacadePart
 from blast_env.vehicles.crash_rating import CrashRating
 

@@ -8,13 +8,12 @@ from typing import Final
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import TOLERANCE_M, Rectangle
 from blast_env.problems import Problem, extent, unknown_name
-from blast_env.sections import Site
+from blast_env.sections import MOST_MODULES, GaugeSection
 from blast_env.site.blast_site import BARRIER_NAME
 from blast_env.site.content import Content
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
 from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or_below
-from blast_env.site.parameters import AirParameters, for_charge
-from blast_env.site.sections import MOST_MODULES, GaugeSection
+from blast_env.site.parameters import for_charge
 from blast_env.site.sources import PlaceSource, VehicleSource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import terrace_problems
@@ -60,11 +59,10 @@ def _count_problems(scenario: Content) -> Iterator[Problem]:
 
 
 def _vehicle_count_problems(scenario: Content) -> Iterator[Problem]:
-    vehicles = [source for source in scenario.charge if isinstance(source, VehicleSource)]
-    if vehicles:
+    if scenario.vehicles:
         from blast_env.site.vehicle_checks import vehicle_count_problems
 
-        yield from vehicle_count_problems(scenario.site, vehicles)
+        yield from vehicle_count_problems(scenario.site, scenario.vehicles)
 
 
 def _facade_problems(scenario: Content) -> Iterator[Problem]:
@@ -78,7 +76,7 @@ def _facade_problems(scenario: Content) -> Iterator[Problem]:
 
 def _removable_problems(scenario: Content) -> Iterator[Problem]:
     """Check that removable structures exist, and are neither protected nor otherwise needed."""
-    if scenario.build_zone is None:
+    if scenario.build_zone is None or not scenario.build_zone.removable:
         return
     structures = {structure.name: structure for structure in scenario.structures}
     # A structure can be taken away once: the first measure that names it has it.
@@ -167,7 +165,7 @@ def _structure_problems(scenario: Content) -> Iterator[Problem]:
         )
     # Structures may stand above each other, but not in each other.
     for (i, one), (j, other) in combinations(enumerate(scenario.structures), 2):
-        if _overlap(one, other) and not _are_above_each_other(one, other):
+        if _overlap(one, other) and not _are_stacked(one, other):
             message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
             yield Problem(f"structures[{j}]", message)
 
@@ -179,7 +177,7 @@ def _overlap(one: AnyStructure, other: AnyStructure) -> bool:
     )
 
 
-def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
+def _are_stacked(one: AnyStructure, other: AnyStructure) -> bool:
     """Return whether one of two structures begins at or above the top of the other."""
     return any(
         low.height_m is not None and high.base_m >= low.height_m - TOLERANCE_M
@@ -287,7 +285,7 @@ def _above_the_air(
 
 
 def _simulation_problems(scenario: Content) -> Iterator[Problem]:
-    """Check that no balls overlap at the start."""
+    """Check that no balls overlap at the start, and the number of air balls, by memory."""
     air, explosive = scenario.parameters.air, scenario.parameters.explosive
     if 0.0 < air.spacing_units < 2.0 * air.radius_units:
         yield Problem(
@@ -295,8 +293,13 @@ def _simulation_problems(scenario: Content) -> Iterator[Problem]:
             f"is {air.spacing_units:g}, must be 0 (no air) or at least"
             f" {2.0 * air.radius_units:g}, twice radius_units: the balls would overlap",
         )
-    else:
-        yield from _too_much_air(scenario.site, air)
+    elif (balls := air.most_balls(scenario.site.rectangle_m)) > MOST_AIR_BALLS:
+        site = scenario.site
+        yield Problem(
+            "simulation.overrides.air.spacing_units",
+            f"is {air.spacing_units:g}, which makes {balls:,} air balls on a site of"
+            f" {site.width_m:g} x {site.height_m:g} m, must make at most {MOST_AIR_BALLS:,}",
+        )
     if explosive.collide_within_charge and explosive.ball_count > 1:
         sine = math.sin(math.pi / explosive.ball_count)
         if 2.0 * explosive.offset_units * sine < 2.0 * explosive.radius_units - TOLERANCE_M:
@@ -333,17 +336,6 @@ def particle_problems(scenario: Content) -> Iterator[Problem]:
             for_charge(scenario.parameters, source.tnt_kg)
         except BlastEnvError as error:
             yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
-
-
-def _too_much_air(site: Site, air: AirParameters) -> Iterator[Problem]:
-    """Check the number of air balls, which memory limits."""
-    balls = air.most_balls(site.rectangle_m)
-    if balls > MOST_AIR_BALLS:
-        yield Problem(
-            "simulation.overrides.air.spacing_units",
-            f"is {air.spacing_units:g}, which makes {balls:,} air balls on a site of"
-            f" {site.width_m:g} x {site.height_m:g} m, must make at most {MOST_AIR_BALLS:,}",
-        )
 
 
 def _described(structure: AnyStructure) -> str:

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Final
 from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.geometry import Element, Rectangle, Wall
-from blast_env.hashing import HashMark
 from blast_env.response.components import Component
-from blast_env.sections import FOR_PEOPLE, Name, Section, Site
+from blast_env.sections import (
+    FOR_PEOPLE,
+    AnyGeoreference,
+    GaugeSection,
+    HashMark,
+    Name,
+    Section,
+    Site,
+)
 from blast_env.site.heights import default_air_height_m
 from blast_env.site.objective import ObjectiveSection
-from blast_env.site.parameters import SimulationParameters
-from blast_env.site.sections import AnyGeoreference, GaugeSection, SimulationSection
+from blast_env.site.parameters import SimulationParameters, SimulationSection
 from blast_env.site.sources import AnySource, VehicleSource
 from blast_env.site.structures import AnyStructure, loaded_walls
 from blast_env.site.zone import BuildZone, Surroundings
@@ -75,12 +81,17 @@ class Content(Section):
         """The parameters of the particle model."""
         return self.simulation.parameters
 
+    @cached_property
+    def vehicles(self) -> tuple[VehicleSource, ...]:
+        """The sources that are vehicles."""
+        return tuple(source for source in self.charge if isinstance(source, VehicleSource))
+
     @property
     def charge_radius_m(self) -> float:
         """Radius of the charge's disc at the start, m."""
         return self.parameters.charge_radius_m
 
-    @property
+    @cached_property
     def air_height_m(self) -> float:
         """Height of the simulated air, m: that of `site`, or the default.
 
@@ -98,6 +109,8 @@ class Content(Section):
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that remain with a layout."""
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        if not away:
+            return self.structures
         return tuple(structure for structure in self.structures if structure.name not in away)
 
     @property

@@ -128,11 +128,11 @@ def _located(name_or_path: str | Path) -> Path:
         raise ScenarioError("scenario", [Problem("", str(error))]) from error
     is_folder = os.path.isdir(path)
     if path.name == str(name_or_path) and not path.suffix:
-        known = bundled_scenarios()
-        if path.name in known:
-            return scenario_folder() / f"{path.name}{SUFFIX}"
+        bundled = scenario_folder() / f"{path.name}{SUFFIX}"
+        if os.path.isfile(bundled):
+            return bundled
         if not is_folder:
-            message = unknown_name("bundled scenario", path.name, known)
+            message = unknown_name("bundled scenario", path.name, bundled_scenarios())
             raise ScenarioError(path.name, [Problem("", message)])
     if path.suffix != SUFFIX and not is_folder:
         raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])

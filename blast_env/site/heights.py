@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import any_in_windows, counts_before
+from blast_env.sections import GaugeSection
 from blast_env.site.blast_site import WALLS
-from blast_env.site.sections import GaugeSection
 from blast_env.site.sources import AnySource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_m
@@ -27,10 +27,9 @@ def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | N
     It is 12 m, or 6 m more than the highest structure or barrier if that is more.
     """
     structures = tuple(structures)
-    heights = [structure.height_m for structure in structures]
-    heights.append(None if zone is None else highest_top_m(zone, structures))
-    highest = max((height for height in heights if height is not None), default=0.0)
-    return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
+    tops_m = [structure.height_m or 0.0 for structure in structures]
+    barrier_m = None if zone is None else highest_top_m(zone, structures)
+    return max(LEAST_AIR_HEIGHT_M, max(*tops_m, barrier_m or 0.0) + AIR_ABOVE_M)
 
 
 def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
@@ -50,9 +49,14 @@ def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tu
     Charges and vehicles are ignored. An item that fits nowhere has 0.
     """
     structures = tuple(structures)
-    terraces_m = (box for structure in structures if structure.carries for box in structure.boxes_m)
-    here = (box.overlaps(zone.rectangle_m) for box in terraces_m)
-    return _grounds_m(zone, structures) if any(here) else (0.0,) * max(len(zone.items), 1)
+    zone_m = zone.rectangle_m
+    has_terrace = any(
+        box.overlaps(zone_m)
+        for structure in structures
+        if structure.carries
+        for box in structure.boxes_m
+    )
+    return _grounds_m(zone, structures) if has_terrace else (0.0,) * max(len(zone.items), 1)
 
 
 @lru_cache(maxsize=16)

@@ -18,9 +18,9 @@ from pydantic import (
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
-from blast_env.hashing import HashMark, digest_of, fields_with, hashed_content
 from blast_env.problems import Problem, ScenarioError, problems_from
 from blast_env.response.components import Alternatives, FacadeBay, Glazing, Wall, catalogue
+from blast_env.sections import HashMark, digest_of, fields_with, hashed_content
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems
@@ -330,11 +330,6 @@ class Scenario(Content):
         for structure in without:
             structure["facade"] = facade
         return Scenario.from_document(document, self.name)
-
-    @property
-    def vehicles(self) -> tuple[VehicleSource, ...]:
-        """The sources that are vehicles."""
-        return tuple(source for source in self.charge if isinstance(source, VehicleSource))
 
     @property
     def building_names(self) -> dict[str, str]:

@@ -7,10 +7,9 @@ import numpy as np
 from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.arrays import FloatArray
-from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
 from blast_env.response.levels import LevelOfProtection, fails_from
-from blast_env.sections import Section
+from blast_env.sections import HashMark, Section
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level, conditional_value_at_risk
 
 Reference = Annotated[StrictFloat, Field(ge=1e-3, le=1e12)]

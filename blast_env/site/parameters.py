@@ -6,12 +6,15 @@ default is the value of the preset `ballistic`.
 
 import json
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from hashlib import sha256
-from math import ceil, prod, sqrt
+from itertools import chain
+from math import ceil, sqrt
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -21,8 +24,10 @@ from pydantic import (
     ValidationError,
 )
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownNameError, type_word
 from blast_env.geometry import Rectangle
+from blast_env.problems import Problem, ScenarioError, problems_from, unknown_key, unknown_name
+from blast_env.sections import Section
 from blast_env.units import UNITS_PER_M
 
 Fraction = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
@@ -114,8 +119,8 @@ class AirParameters(BallParameters):
         if self.spacing_units == 0.0:
             return 0
         site = site_m.scaled(UNITS_PER_M)
-        lengths = site.right - site.left, site.top - site.bottom
-        return prod(ceil(length / self.spacing_units) for length in lengths)
+        rows = ceil((site.top - site.bottom) / self.spacing_units)
+        return rows * ceil((site.right - site.left) / self.spacing_units)
 
 
 class ContactParameters(Parameters):
@@ -329,6 +334,64 @@ def preset(name: str) -> SimulationParameters:
     if name not in PRESETS:
         raise UnknownNameError("preset", name, PRESETS)
     return PRESETS[name]
+
+
+def _check_preset(name: str) -> str:
+    """Refuse the name of a preset that does not exist."""
+    if name not in PRESETS:
+        raise ScenarioError("preset", [Problem("", unknown_name("preset", name, PRESETS))])
+    return name
+
+
+PresetName = Annotated[str, AfterValidator(_check_preset)]
+"""Name of a preset of the particle model."""
+
+
+def _check_overrides(overrides: dict[str, Any]) -> dict[str, Any]:
+    """Refuse overrides of unknown parameters, and values out of bounds."""
+    groups = (_group_problems(group, values) for group, values in overrides.items())
+    problems = tuple(chain.from_iterable(groups))
+    if problems:
+        raise ScenarioError("overrides", problems)
+    return overrides
+
+
+def _group_problems(group: str, values: object) -> tuple[Problem, ...]:
+    """Return the problems of the overrides of one group of parameters."""
+    field = SimulationParameters.model_fields.get(group)
+    if field is None:
+        return (unknown_key((group,), SimulationParameters.model_fields),)
+    model = field.annotation
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        raise TypeError(f"SimulationParameters.{group} is not a group of parameters")
+    if not isinstance(values, Mapping):
+        return (Problem(group, f"is {type_word(values)}, must be a table"),)
+    try:
+        # A group's values are independent and have defaults, so the overrides can be checked
+        # alone, and every problem concerns a given key.
+        model.model_validate(values, strict=True)
+    except ValidationError as error:
+        return problems_from(error, model, (group,))
+    return ()
+
+
+class SimulationSection(Section):
+    """The particle model's parameters: a preset by name, with overrides.
+
+    Attributes:
+        preset: A name in `blast_env.site.parameters.PRESETS`.
+        overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
+    """
+
+    preset: PresetName = "ballistic"
+    overrides: Annotated[dict[str, Any], AfterValidator(_check_overrides)] = Field(
+        default_factory=dict
+    )
+
+    @cached_property
+    def parameters(self) -> SimulationParameters:
+        """The preset with the overrides applied."""
+        return with_overrides(preset(self.preset), self.overrides)
 
 
 def for_charge(parameters: SimulationParameters, tnt_kg: float) -> SimulationParameters:

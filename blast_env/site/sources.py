@@ -13,10 +13,10 @@ from pydantic import (
 )
 
 from blast_env.geometry import TOLERANCE_M
-from blast_env.hashing import HashMark
 from blast_env.sections import (
     Coordinate,
     Ground,
+    HashMark,
     Name,
     PointM,
     Section,
@@ -83,7 +83,7 @@ class PointSource(ChargeSource):
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
         """The point as a line without a length."""
-        return (self.segment_m,)
+        return ((self.position_m, self.position_m),)
 
     def has_place(self, position_m: PointM) -> bool:
         """Return whether it is the point."""
@@ -109,7 +109,7 @@ class SegmentSource(ChargeSource):
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
         """The lines of the charge's places."""
-        return (self.segment_m,)
+        return ((self.start_m, self.end_m),)
 
     def has_place(self, position_m: PointM) -> bool:
         """Return whether the segment has a point, but for rounding."""

@@ -14,15 +14,23 @@ from pydantic import (
 
 from blast_env.bays import BAY_M, STOREY_M, Bay
 from blast_env.geometry import Cell, Rectangle, Wall, WallName
-from blast_env.hashing import HashMark
 from blast_env.problems import (
     Problem,
     ScenarioError,
 )
 from blast_env.response.components import PaneSide
-from blast_env.sections import FOR_PEOPLE, Coordinate, Height, Name, PointM, Section
+from blast_env.sections import (
+    FOR_PEOPLE,
+    MOST_MODULES,
+    Coordinate,
+    Count,
+    HashMark,
+    Height,
+    Name,
+    PointM,
+    Section,
+)
 from blast_env.site.blast_site import WALLS
-from blast_env.site.sections import MOST_MODULES, Count
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # shapely takes a tenth of a second to import

@@ -75,10 +75,10 @@ def lie_wholly_on(
 
 def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -> bool:
     """Return whether there is air below a structure: it is not on the ground or on a terrace."""
-    boxes = tuple(np.array(sides) for sides in zip(*structure.boxes_m, strict=True))
-    left, bottom, right, top = boxes
-    whole = lie_wholly_on(structures, structure.base_m, (left, bottom, right, top))
-    return structure.base_m > 0.0 and not whole.all()
+    if structure.base_m == 0.0:
+        return False
+    left, bottom, right, top = np.array(structure.boxes_m).T
+    return not lie_wholly_on(structures, structure.base_m, (left, bottom, right, top)).all()
 
 
 def _terraces(structures: Iterable[AnyStructure]) -> Iterator[tuple[Rectangle, float]]:

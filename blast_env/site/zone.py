@@ -28,8 +28,17 @@ from blast_env.geometry import (
     overlapping,
     overlapping_any,
 )
-from blast_env.hashing import HashMark
-from blast_env.sections import FOR_PEOPLE, Area, Height, PointM, Section, Site, SparseSection
+from blast_env.sections import (
+    FOR_PEOPLE,
+    Area,
+    Count,
+    HashMark,
+    Height,
+    PointM,
+    Section,
+    Site,
+    SparseSection,
+)
 from blast_env.site.catalogue import (
     MOST_ITEMS,
     AnyMeasure,
@@ -41,7 +50,6 @@ from blast_env.site.catalogue import (
     ModulePlace,
     Variant,
 )
-from blast_env.site.sections import Count
 from blast_env.site.sources import AnySource, PointSource, RectangleSource, VehicleSource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import ground_m, lie_wholly_on
@@ -160,14 +168,16 @@ class BuildZone(Section):
 
     def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
         """Return the names of the structures that a layout removes."""
+        if not self.removable:
+            return frozenset()
         taken = {element.item for element in layout if isinstance(element, Removal)}
         own = (removal.structures for removal in self.removable if removal.name in taken)
-        return frozenset(name for names in own for name in names)
+        return frozenset().union(*own)
 
     @property
     def may_be_taken_away(self) -> frozenset[str]:
         """The names of the structures that a layout can remove."""
-        return frozenset(name for removal in self.removable for name in removal.structures)
+        return frozenset().union(*(removal.structures for removal in self.removable))
 
     def modules(self, layout: Iterable[Element]) -> tuple[ModulePlace, ...]:
         """Return the modules of a layout, piece by piece.
@@ -288,7 +298,7 @@ def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
 
 def distance_m(source: AnySource, rectangle: Rectangle) -> float:
     """Return the least distance of the charge's centre from a rectangle, m; see `distances_m`."""
-    left, bottom, right, top = (np.array(side) for side in rectangle)
+    left, bottom, right, top = map(np.asarray, rectangle)
     return float(distances_m(source, (left, bottom, right, top)))
 
 

@@ -112,7 +112,7 @@ class Visibility:
             over &= (share == 1.0) | (ends_m == 0.0) | (share * ends_m >= high_m)
         open_share *= float(weight[over].sum() / max(weight.sum(), 1e-300))
         height_m = (ends_m.reshape(TARGETS, -1, 1, 1) * along_share).reshape(-1, *cut.shape[1:])
-        height_m -= LayoutState.empty(scenario).ground_m
+        height_m -= LayoutState.empty(scenario).empty_zone.ground_m
         cut = np.tile(cut, (TARGETS, 1, 1))
         if over.all():  # the usual case, without copies
             return cls(weight, cut, height_m, open_share)
@@ -478,7 +478,7 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     cells = int(usable.sum())
     modules = zone.stock
     if zone.budget is not None:
-        mean_cost = LayoutState.empty(scenario).module_costs[usable].mean()
+        mean_cost = LayoutState.empty(scenario).empty_zone.module_costs[usable].mean()
         modules = min(modules, int(zone.budget / mean_cost))
     # A line is missed if all modules stand on cells that do not cut it.
     harmless = cells - lines.cut[:, usable].sum(axis=1)

@@ -12,7 +12,7 @@ from blast_env.geometry import Rectangle, box_distances_m
 from blast_env.problems import problems_from
 from blast_env.sections import Name, Section
 from blast_env.site import Problem, ScenarioError
-from blast_env.site.sections import PresetName
+from blast_env.site.parameters import PresetName
 from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.access_way import WholeModules

@@ -28,9 +28,9 @@ from blast_env.evaluation import BlastEvaluator, BlastStore, BudgetError
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.validation import worst_validation
 from blast_env.geometry import Layout
-from blast_env.hashing import digest_of
 from blast_env.layout import check_layout
 from blast_env.layout.placement import load_relevant
+from blast_env.sections import digest_of
 from blast_env.surrogate import Surrogate, SurrogateSite, packaged_surrogate, site_of
 from blast_env.tools.guesses import guessed_shares
 from blast_env.tools.records import (

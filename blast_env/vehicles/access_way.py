@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, StrictFloat
 
 from blast_env.arrays import BoolArray
-from blast_env.hashing import HashMark
-from blast_env.sections import Ground, Section, SparseSection
+from blast_env.sections import Ground, HashMark, Section, SparseSection
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.crash_rating import CrashRating
 

@@ -16,9 +16,8 @@ from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.errors import value_text
 from blast_env.geometry import Rectangle
-from blast_env.hashing import HashMark
 from blast_env.problems import Problem, ScenarioError
-from blast_env.sections import FOR_PEOPLE, Section
+from blast_env.sections import FOR_PEOPLE, HashMark, Section
 from blast_env.vehicles.vehicle import Speed, VehicleMass
 
 _ASTM_KG: Final[Mapping[str, float]] = MappingProxyType(

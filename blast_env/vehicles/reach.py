@@ -40,12 +40,6 @@ def places_on(site: Site) -> int:
     return along_x * along_y
 
 
-def squares_of(site: Site) -> tuple[int, int]:
-    """Return the number of rows and of columns of squares of 0.5 m that cover a site."""
-    rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
-    return rows, columns
-
-
 @dataclass(frozen=True, eq=False)
 class Reach:
     """The reach of a vehicle.

@@ -336,7 +336,7 @@ def test_a_dictionary_of_ones_own_gets_the_mask_too() -> None:
 # --- Rectangles, lattices and places of charges on the grid of the site.
 
 
-GRID = SiteGrid.of(Site(width_m=10.0, height_m=6.0))
+GRID = SiteGrid(*Site(width_m=10.0, height_m=6.0).squares)
 across = st.floats(0.5, 9.5)
 up = st.floats(0.5, 5.5)
 points = st.tuples(across, up)
@@ -356,7 +356,7 @@ sources = st.one_of(
 
 def test_the_grid_covers_a_site_that_is_no_whole_number_of_modules() -> None:
     assert (GRID.rows, GRID.columns) == (12, 20)
-    assert SiteGrid.of(Site(width_m=10.1, height_m=6.0)) == SiteGrid(12, 21)
+    assert Site(width_m=10.1, height_m=6.0).squares == (12, 21)
 
 
 @given(points, points)

@@ -111,7 +111,7 @@ def test_placing_leaves_the_placement_as_it_was() -> None:
     assert (before.free == free).all()
 
 
-@pytest.mark.parametrize("name", ["free", "usable", "module_costs"])
+@pytest.mark.parametrize("name", ["free", "usable", "open_ground"])
 def test_arrays_are_read_only(name: str) -> None:
     placement = LayoutState.of(zone_scenario(), [(0, 0)])
     for case in (placement, pickle.loads(pickle.dumps(placement))):

@@ -38,7 +38,7 @@ def test_cells_too_dear_for_the_rest_of_the_budget_are_not_free() -> None:
 def test_highest_cost_counts_where_areas_overlap_and_areas_may_be_cheap() -> None:
     duct = area(0.0, 0.0, 1.0, 1.0, module_cost=3.0, reason="duct")
     slab = area(0.5, 0.5, 1.25, 1.0, module_cost=0.5, reason="foundation slab")
-    costs = LayoutState.empty(zone_scenario(cost_areas=[slab, duct])).module_costs
+    costs = LayoutState.empty(zone_scenario(cost_areas=[slab, duct])).empty_zone.module_costs
     # The slab reaches half into column 3.
     assert costs[:4, :5].tolist() == [
         [3.0, 3.0, 1.0, 1.0, 1.0],

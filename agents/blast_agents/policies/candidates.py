@@ -26,7 +26,6 @@ from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue
 from blast_env.surrogate.walls import WallPoints
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.reach import squares_of
 
 BEARINGS: Final = 32
 """Bearings from a charge on which the protected walls are counted."""
@@ -417,7 +416,7 @@ _AGAINST_VEHICLES: Final = tuple(
 
 def _in_reach(scenario: Scenario, boxes_m: FloatArray) -> FloatArray:
     """Return the share of each box that a vehicle can reach on the empty site (boxes,)."""
-    rows, columns = squares_of(scenario.site)
+    rows, columns = scenario.site.squares
     ground = np.zeros((rows, columns), dtype=bool)
     for source in scenario.vehicles:
         ground |= vehicle_reach(scenario, source).ground(rows, columns)

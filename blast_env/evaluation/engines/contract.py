@@ -243,13 +243,16 @@ class Engine(ABC):
         Raises:
             BlastEnvError: If the engine has no such setting, or the value is out of bounds.
         """
-        given = {name: value for name, value in settings.items() if value is not None}
-        for name, value in given.items():
+        given = {}
+        for name, value in settings.items():
+            if value is None:
+                continue
             if name not in self.options:
                 noun = "cells" if name == "cell_m" else f"setting {name}"
                 raise BlastEnvError(
                     f"{name} is {value_text(value)}, but engine {self.name!r} has no {noun}"
                 )
+            given[name] = value
         made: Self = replace(self, **given) if given else self  # type: ignore[type-var]
         return made
 

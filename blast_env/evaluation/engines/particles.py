@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal
 
 import numpy as np
 
@@ -145,7 +145,12 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
 class Blast(RunnableBlast):
     """One blast of a particle engine, which may be given by its name."""
 
-    engine: str | Engine = "pymunk"
+    engine: Any = "pymunk"  # an engine from then on
+
+    def __post_init__(self) -> None:
+        """Find the scenario and the engine of a name."""
+        super().__post_init__()
+        object.__setattr__(self, "engine", find_particle_engine(self.engine))
 
     @cached_property
     def scene(self) -> "Scene":
@@ -154,14 +159,10 @@ class Blast(RunnableBlast):
 
         return build_scene(self.scenario, self.layout, self.seed, self.charge)
 
-    @cached_property
-    def particle_engine(self) -> ParticleEngine:
-        """The engine itself; see `find_particle_engine`."""
-        return find_particle_engine(self.engine)
-
     def start(self) -> "BlastRun":
         """Return a run at time 0."""
-        return self.particle_engine.start(self.scene)
+        run: BlastRun = self.engine.start(self.scene)
+        return run
 
     def run(self, progress: Callable[[float], None] | None = None) -> "BlastResult":
         """Run the blast to its end.
@@ -182,11 +183,10 @@ class Blast(RunnableBlast):
         """Return the outcome of a run that has ended."""
         if run.end_reason is None:
             raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
-        engine = self.particle_engine
         return BlastResult(
             blast=self,
-            engine_name=engine.name,
-            engine_version=engine.version,
+            engine_name=self.engine.name,
+            engine_version=self.engine.version,
             collision_array=run.log.to_array(),
             obstacles=run.obstacles,
             final_balls=run.balls(),
@@ -225,7 +225,8 @@ class BlastResult:
     @property
     def step_name(self) -> str:
         """The unit of `steps`: time steps, or the events of an event-driven engine."""
-        return self.blast.particle_engine.step_name
+        name: str = self.blast.engine.step_name
+        return name
 
     @cached_property
     def collisions(self) -> "pd.DataFrame":
@@ -288,10 +289,13 @@ class BlastResult:
         obstacle = self.obstacle(structure)
         if obstacle.is_barrier:
             raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
-        law = self.calibration if calibration is None else calibration
+        return self._scaled(obstacle, self.calibration if calibration is None else calibration)
+
+    def _scaled(self, structure: "ModularObstacle", law: Calibration) -> ScaledImpulse:
+        """Return the impulse per area on a structure by a law."""
         if not isinstance(law, Calibration):
             raise CalibrationError(f"calibration is {value_text(law)}, must be a Calibration")
-        scaled = law.convert_load(obstacle, self.blast.scene.charge)
+        scaled = law.convert_load(structure, self.blast.scene.charge)
         if self.end_reason is not EndReason.EVENT_LIMIT:
             return scaled
         notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
@@ -304,23 +308,20 @@ class BlastResult:
         # Loads on structures need the calibration; those on modules stay in simulation units.
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
         named = {structure.name: structure for structure in self.blast.scenario.structures}
-        return BlastLoads(
-            structures=tuple(
-                StructureLoad.on(
-                    named[structure.name],
-                    scaled.pa_s,
-                    in_range=scaled.in_range,
-                    notes=scaled.notes,
-                    validation=_CALIBRATED
-                    if scaled.in_range
-                    else Validation(ValidationStatus.OUTSIDE, "; ".join(scaled.notes)),
-                    impulse_sim=structure.impulse,
-                )
-                for structure in structures
-                for scaled in [self.impulse(structure.name, law)]
-            ),
-            module_impulse_sim=np.array(impulse, dtype=np.float64),
-        )
+        loads = []
+        for structure in structures:
+            scaled = self._scaled(structure, law)
+            outside = Validation(ValidationStatus.OUTSIDE, "; ".join(scaled.notes))
+            load = StructureLoad.on(
+                named[structure.name],
+                scaled.pa_s,
+                in_range=scaled.in_range,
+                notes=scaled.notes,
+                validation=_CALIBRATED if scaled.in_range else outside,
+                impulse_sim=structure.impulse,
+            )
+            loads.append(load)
+        return BlastLoads(tuple(loads), module_impulse_sim=np.array(impulse, dtype=np.float64))
 
     @cached_property
     def load_unit(self) -> LoadUnit:

@@ -14,8 +14,7 @@ from blast_env.files import make_folder, write_text
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table
 from blast_env.layout import write_layout
 from blast_env.plots.plan import Feature
-from blast_env.sections import PointM
-from blast_env.site.sections import AnyGeoreference
+from blast_env.sections import AnyGeoreference, PointM
 from blast_env.tables import write_csv
 from blast_env.values import path_of
 

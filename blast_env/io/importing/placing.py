@@ -25,7 +25,7 @@ from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_
 from blast_env.io.importing.plane import Plane, plane_around, rotated
 from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
-from blast_env.site.sections import AnyGeoreference
+from blast_env.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
 
 OUTSIDE: Final = "outside the site"

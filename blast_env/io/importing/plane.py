@@ -9,7 +9,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, reason_of, value_text
-from blast_env.site.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
+from blast_env.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
 
 with import_extra("maps", "maps and drawings"):
     from pyproj import CRS, Transformer

@@ -155,6 +155,11 @@ class Calibration(CalibrationSection):
         """The law from i_sim on the reference facade to psi*s."""
         return LAWS[self.law](**self.coefficients)
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all of it, which distinguishes versions of the same name."""
+        return sha256(self.model_dump_json().encode()).hexdigest()
+
     def check(self, parameters: SimulationParameters, engine: str) -> None:
         """Reject a simulation for which the calibration was not made.
 
@@ -294,17 +299,18 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
 
 @cache
 def _of_the_package(name: str, engine: str | None) -> Calibration:
-    engines = calibrated_engines(name)
-    if not engines:
+    if engine is None:
+        engines = calibrated_engines(name)
+        engine = "pymunk" if "pymunk" in engines or not engines else engines[0]
+    if (name, engine) in _stored_files():
+        folder = files("blast_env.particles.calibration") / "stored"
+        return _parsed((folder / calibration_file(name, engine)).read_text(encoding="utf-8"))
+    if not calibrated_engines(name):
         raise UnknownNameError("calibration", name, stored_calibrations())
-    engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
-    if engine not in engines:
-        raise CalibrationError(
-            f"calibration {name!r} was not made for engine {engine!r}, only for "
-            f"{', '.join(engines)}"
-        )
-    entry = files("blast_env.particles.calibration") / "stored" / calibration_file(name, engine)
-    return _parsed(entry.read_text(encoding="utf-8"))
+    raise CalibrationError(
+        f"calibration {name!r} was not made for engine {engine!r}, only for "
+        f"{', '.join(calibrated_engines(name))}"
+    )
 
 
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:

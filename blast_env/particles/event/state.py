@@ -347,10 +347,7 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     Raises:
         BlastEnvError: If the cells are too small to hold a ball, or a ball is off the site.
     """
-    _check(scene, cell_units)
-    # A little more, so that touching balls are in neighbouring cells despite rounding.
-    smallest = (1.0 + _CELL_MARGIN) * _largest_diameter(scene)
-    rules = _rules(scene, max(smallest, cell_units or _cell_units(scene)))
+    rules = _rules(scene, _cell_side(scene, cell_units))
     balls = _balls(scene.balls)
     heap = np.zeros(len(balls) + 1, dtype=HEAP_ENTRY)
     loads = np.zeros(len(parts), dtype=LOAD)
@@ -371,12 +368,15 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     return with_walls(world, scene, parts)
 
 
-def _check(scene: Scene, cell_units: float | None) -> None:
-    """Reject input with which the compiled code would miss collisions or leave its arrays."""
-    diameter = _largest_diameter(scene)
-    if cell_units is not None and not diameter <= cell_units < np.inf:
+def _cell_side(scene: Scene, wanted: float | None) -> float:
+    """Return the side of a cell: the wanted one, else by the air's spacing and the number of balls.
+
+    Input with which the compiled code would miss collisions or leave its arrays is refused.
+    """
+    diameter = 2.0 * float(scene.balls.radius.max(initial=0.01))
+    if wanted is not None and not diameter <= wanted < np.inf:
         raise BlastEnvError(
-            f"cell_units is {cell_units:g}, must be at least {diameter:g}, "
+            f"cell_units is {wanted:g}, must be at least {diameter:g}, "
             "the diameter of the largest ball, and finite"
         )
     position, site = scene.balls.position, scene.site
@@ -385,6 +385,11 @@ def _check(scene: Scene, cell_units: float | None) -> None:
         raise BlastEnvError(
             f"ball {ball} is at {tuple(position[ball].tolist())}, must be on the site {site}"
         )
+    area = (site.right - site.left) * (site.top - site.bottom)
+    sparse = sqrt(area / (4.0 * len(scene.balls) + 1024.0))
+    usual = max(sparse, _CELL_SPACINGS * scene.parameters.air.spacing_units)
+    # A little more, so that touching balls are in neighbouring cells despite rounding.
+    return max((1.0 + _CELL_MARGIN) * diameter, wanted or usual)
 
 
 def with_walls(world: World, scene: Scene, parts: list[ModularPart]) -> World:
@@ -452,17 +457,6 @@ def _rules(scene: Scene, cell_units: float) -> Record:
     rules["time_limit_s"] = stepping.time_limit_s
     rules["most_collisions"] = stepping.most_collisions
     return rules
-
-
-def _cell_units(scene: Scene) -> float:
-    """Return the default side of a cell, by the spacing of the air and the number of balls."""
-    width, height = scene.site.right - scene.site.left, scene.site.top - scene.site.bottom
-    sparse = sqrt(width * height / (4.0 * len(scene.balls) + 1024.0))
-    return max(sparse, _CELL_SPACINGS * scene.parameters.air.spacing_units)
-
-
-def _largest_diameter(scene: Scene) -> float:
-    return 2.0 * float(scene.balls.radius.max(initial=0.01))
 
 
 def _grid_shape(site: Rectangle, rules: Record) -> tuple[int, int]:
