@@ -9,14 +9,7 @@ from typing import Any, Final, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from blast_env.errors import (
-    BlastEnvError,
-    KeyParts,
-    alternatives,
-    key_path,
-    suggestion,
-    value_text,
-)
+from blast_env.errors import BlastEnvError, KeyParts, alternatives, key_path, suggestion, value_text
 from blast_env.geometry import Rectangle
 
 

@@ -39,13 +39,7 @@ from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, case_for, improved
 from blast_env.design.search.package import PackageProposer
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import (
-    BlastEvaluator,
-    DesignProblem,
-    LoadCaseSet,
-    SeedRange,
-    draw_threats,
-)
+from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, Piece

@@ -4,14 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.answers.document import (
-    AnyPart,
-    Line,
-    Table,
-    building_words,
-    lines,
-    validation_lines,
-)
+from blast_env.answers.document import AnyPart, Line, Table, building_words, lines, validation_lines
 from blast_env.answers.pieces import pieces_answer
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult

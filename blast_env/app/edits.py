@@ -13,13 +13,7 @@ from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.sections import PointM
-from blast_env.site import (
-    SCHEMA_VERSION,
-    AnySource,
-    RectangleSource,
-    Scenario,
-    VehicleSource,
-)
+from blast_env.site import SCHEMA_VERSION, AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.presets import CHARGE_PRESETS
 from blast_env.site.sources import SegmentSource
 from blast_env.site.terraces import ground_below_m

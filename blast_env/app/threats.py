@@ -6,13 +6,7 @@ from typing import Final
 
 from blast_env.evaluation import LoadCase
 from blast_env.sections import PointM
-from blast_env.site import (
-    RectangleSource,
-    Scenario,
-    SegmentSource,
-    VehicleCharge,
-    VehicleSource,
-)
+from blast_env.site import RectangleSource, Scenario, SegmentSource, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import Charge
 from blast_env.vehicles.worst_places import stand_off_m
 

@@ -13,13 +13,7 @@ from blast_env.benchmark.references import ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
 from blast_env.design.search import Candidate, DesignProblem
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import (
-    BlastEvaluator,
-    BlastStore,
-    BudgetError,
-    LoadCase,
-    LoadCaseSet,
-)
+from blast_env.evaluation import BlastEvaluator, BlastStore, BudgetError, LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout

@@ -31,12 +31,7 @@ from blast_env.cli.options import (
 from blast_env.cli.output import blasts_running, print_written, resumable, save_figures
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for, most_blasts
-from blast_env.design.search.advised import (
-    ROUNDS,
-    AdviceJudge,
-    advised,
-    site_with_target,
-)
+from blast_env.design.search.advised import ROUNDS, AdviceJudge, advised, site_with_target
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, choosing_engine, final_engine

@@ -19,12 +19,7 @@ from blast_env.cli.options import (
     numbers,
     resume_words,
 )
-from blast_env.cli.output import (
-    InterruptedCommandError,
-    blasts_running,
-    print_written,
-    resumable,
-)
+from blast_env.cli.output import InterruptedCommandError, blasts_running, print_written, resumable
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.layout import check_layout, load_layout

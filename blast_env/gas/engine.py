@@ -21,14 +21,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
 from blast_env.gas.cost import cost_of_run
 from blast_env.gas.enclosure import room_around
-from blast_env.gas.ending import (
-    AREA,
-    corners_m,
-    is_known,
-    limit_s,
-    sound_s,
-    watched_structures,
-)
+from blast_env.gas.ending import AREA, corners_m, is_known, limit_s, sound_s, watched_structures
 from blast_env.gas.faces import Faces, exposed_faces
 from blast_env.gas.grid import GasGrid, layers_to
 from blast_env.gas.probes import FaceLoads, Gauges

@@ -5,12 +5,7 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from blast_env.particles.balls import (
-        Balls,
-        CollisionType,
-        air_lattice,
-        explosion_fan,
-    )
+    from blast_env.particles.balls import Balls, CollisionType, air_lattice, explosion_fan
     from blast_env.particles.paper import (
         LINEAR,
         PAPER_LAWS,

@@ -27,11 +27,7 @@ from blast_env.plots.site_plan import (
     write_legend,
     write_names,
 )
-from blast_env.plots.style import (
-    charge_text,
-    render_extra,
-    unit_interval,
-)
+from blast_env.plots.style import charge_text, render_extra, unit_interval
 from blast_env.site import Scenario
 from blast_env.values import count_of
 

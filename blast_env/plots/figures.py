@@ -12,12 +12,8 @@ from blast_env.files import write_atomically
 from blast_env.particles.structure import ModularObstacle
 from blast_env.particles.tables import faces_hit
 from blast_env.plots.heat_map import heat_map
-from blast_env.plots.plan import (
-    QUIET_INK,
-)
-from blast_env.plots.site_plan import (
-    write_heading,
-)
+from blast_env.plots.plan import QUIET_INK
+from blast_env.plots.site_plan import write_heading
 from blast_env.plots.style import (
     blast_title,
     number_on_axis,

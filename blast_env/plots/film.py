@@ -23,11 +23,7 @@ from blast_env.plots.film_files import (
 from blast_env.plots.frames import ONE_SEED, FramePainter
 from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import PAGE
-from blast_env.plots.style import (
-    barrier_text,
-    charge_text,
-    shown_until_s,
-)
+from blast_env.plots.style import barrier_text, charge_text, shown_until_s
 from blast_env.runner import ProgressCallback, share_of
 from blast_env.units import MS_PER_S
 

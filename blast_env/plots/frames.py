@@ -13,13 +13,7 @@ from blast_env.particles.scene import Scene
 from blast_env.particles.structure import ModularObstacle
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.heat_map import LoadScale
-from blast_env.plots.plan import (
-    EXPLOSIVE,
-    STANDING,
-    Kinds,
-    blast_features,
-    without,
-)
+from blast_env.plots.plan import EXPLOSIVE, STANDING, Kinds, blast_features, without
 from blast_env.plots.site_plan import (
     draw_features,
     draw_loads,

@@ -15,12 +15,7 @@ from blast_env.evaluation.engines.gas import GasResult
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import GroundMap
 from blast_env.gas.spherical_stage import SphericalStage, spherical_stage
-from blast_env.plots.gas import (
-    both_results,
-    gas_heading,
-    kind_of,
-    loads_and_solids,
-)
+from blast_env.plots.gas import both_results, gas_heading, kind_of, loads_and_solids
 from blast_env.plots.plan import (
     BORDER,
     INK,

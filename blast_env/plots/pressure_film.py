@@ -17,10 +17,7 @@ from blast_env.gas.solver import Recorder
 from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.plots.canvas import Frame
 from blast_env.plots.film_files import FilmPlan, Footage
-from blast_env.plots.gas import (
-    check_comparable,
-    gas_subtitle,
-)
+from blast_env.plots.gas import check_comparable, gas_subtitle
 from blast_env.plots.pressure_frames import (
     PressurePainter,
     PressureShot,

@@ -10,12 +10,7 @@ from blast_env.evaluation.questions.screening import Screening, ThreatScreening
 from blast_env.geometry import Layout
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.plan import Kinds, charge_feature, site_features, without
-from blast_env.plots.site_plan import (
-    draw_features,
-    draw_plan,
-    write_heading,
-    write_names,
-)
+from blast_env.plots.site_plan import draw_features, draw_plan, write_heading, write_names
 from blast_env.plots.style import render_extra
 from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement

@@ -10,12 +10,7 @@ from blast_env.geometry import TOLERANCE_M, Rectangle
 from blast_env.problems import Problem, extent
 from blast_env.sections import Area
 from blast_env.site.content import Content
-from blast_env.site.zone import (
-    BuildZone,
-    EmptyZone,
-    Surroundings,
-    empty_zone,
-)
+from blast_env.site.zone import BuildZone, EmptyZone, Surroundings, empty_zone
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.access_way import AccessWay, closing_places, is_open
 

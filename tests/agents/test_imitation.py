@@ -17,12 +17,7 @@ from blast_agents.training.agent import (
     policy_for,
 )
 from blast_agents.training.cases import Selection, training_cases
-from blast_agents.training.imitation import (
-    Demonstration,
-    best_by_rule,
-    imitate,
-    imitation_loss,
-)
+from blast_agents.training.imitation import Demonstration, best_by_rule, imitate, imitation_loss
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, settings_from
 from blast_agents.training.weights import read_parameters
 

@@ -5,11 +5,7 @@ import joblib
 import numpy as np
 import pytest
 from blast_agents.training import TrainingSettings, load_hyperparameters
-from blast_agents.training.environments import (
-    EnvironmentMaker,
-    ThreatPool,
-    make_environments,
-)
+from blast_agents.training.environments import EnvironmentMaker, ThreatPool, make_environments
 from blast_agents.training.hyperparameters import SITES_SECTION
 from blast_agents.training.run_folder import RunConfiguration
 from stable_baselines3.common.vec_env import DummyVecEnv

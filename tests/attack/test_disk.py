@@ -16,11 +16,7 @@ import gymnasium
 import numpy as np
 import pytest
 from blast_agents.training import load_agent, resume, train
-from blast_agents.training.evaluations import (
-    EvaluationRow,
-    read_evaluations,
-    write_evaluations,
-)
+from blast_agents.training.evaluations import EvaluationRow, read_evaluations, write_evaluations
 from blast_agents.training.run_folder import RunFolder
 from blast_agents.training.weights import read_parameters, write_model
 from matplotlib.figure import Figure

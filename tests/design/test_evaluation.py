@@ -8,13 +8,7 @@ from blast_agents.training.run_folder import TrainingSettings
 
 from blast_env.benchmark import site_problems
 from blast_env.envs.strategies import SingleScenario
-from blast_env.evaluation import (
-    Evaluators,
-    LoadCaseSet,
-    compare,
-    draw_threats,
-    evaluate_layout,
-)
+from blast_env.evaluation import Evaluators, LoadCaseSet, compare, draw_threats, evaluate_layout
 from blast_env.site import Charge, PointSource, Scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario

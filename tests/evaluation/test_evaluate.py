@@ -8,13 +8,7 @@ import pytest
 
 from blast_env import Charge, simulate
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation import (
-    BlastEvaluator,
-    Evaluation,
-    LoadCase,
-    draw_threats,
-    evaluate_layout,
-)
+from blast_env.evaluation import BlastEvaluator, Evaluation, LoadCase, draw_threats, evaluate_layout
 from blast_env.evaluation.engines.particles import PARTICLES_OVERRATE
 from blast_env.site import Scenario
 from tests.builders import block

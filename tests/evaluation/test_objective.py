@@ -10,12 +10,7 @@ from blast_env.answers.evaluate import means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import (
-    BlastEvaluator,
-    LoadCase,
-    LoadCaseSet,
-    draw_threats,
-)
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
 from blast_env.evaluation.questions.grid_error import impulse_of
 from blast_env.site import (
     Charge,

@@ -27,9 +27,7 @@ from blast_env.particles import (
     structure_table,
     write_blast,
 )
-from blast_env.site import (
-    Scenario,
-)
+from blast_env.site import Scenario
 from blast_env.tables import Column
 from blast_env.workbook import EXCEL_ROWS, record_cells
 from tests.builders import block, point, site, square, zone

@@ -4,15 +4,7 @@ from collections.abc import Iterator
 from math import isfinite, nan
 from typing import Final
 
-from blast_env.answers.document import (
-    AnyCell,
-    AnyPart,
-    Line,
-    Number,
-    Section,
-    Table,
-    lines,
-)
+from blast_env.answers.document import AnyCell, AnyPart, Line, Number, Section, Table, lines
 from blast_env.answers.report.summary import charge_words, grid_error_words
 from blast_env.evaluation.engines.peaks import PeakSource
 from blast_env.evaluation.places import place_text

@@ -12,14 +12,7 @@ from blast_env.app.guard import MOST_BYTES
 from blast_env.app.jobs import Workers
 from blast_env.app.page.numbers import NumberField
 from blast_env.app.plan import SketchView
-from blast_env.app.sources import (
-    MAPS,
-    SITES,
-    imported_site,
-    is_map,
-    map_sketch,
-    site_of_file,
-)
+from blast_env.app.sources import MAPS, SITES, imported_site, is_map, map_sketch, site_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
 from blast_env.io.importing.convert import SiteImport

@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from blast_env.design.search.by_rule import RULES, ProposerKind, ProposerRow
 from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
-from blast_env.design.search.methods import (
-    BestRuleSearch,
-    PopulationAnnealingSearch,
-    RandomSearch,
-)
+from blast_env.design.search.methods import BestRuleSearch, PopulationAnnealingSearch, RandomSearch
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.problem import Proposer
 from blast_env.errors import BlastEnvError, UnknownNameError

@@ -23,20 +23,10 @@ from blast_env.evaluation.engines.bays import (
     BayLoads,
     unjudged_walls,
 )
-from blast_env.evaluation.engines.contract import (
-    BlastDrawing,
-    Engine,
-    EngineBlast,
-    RunnableBlast,
-)
+from blast_env.evaluation.engines.contract import BlastDrawing, Engine, EngineBlast, RunnableBlast
 from blast_env.evaluation.engines.gas_validation import validation_of
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
-from blast_env.evaluation.record import (
-    BlastLoads,
-    BlastRecord,
-    StructureLoad,
-    WallsWithoutVerdict,
-)
+from blast_env.evaluation.record import BlastLoads, BlastRecord, StructureLoad, WallsWithoutVerdict
 from blast_env.evaluation.validation import (
     NOT_KNOWN,
     Validation,
@@ -45,11 +35,7 @@ from blast_env.evaluation.validation import (
 )
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
-from blast_env.gas.settings import (
-    FACE_NAMES,
-    GasSettings,
-    distance_unchecked,
-)
+from blast_env.gas.settings import FACE_NAMES, GasSettings, distance_unchecked
 from blast_env.gas.tables import (
     BUILDING_COLUMNS,
     GAUGE_COLUMNS,
@@ -69,13 +55,7 @@ from blast_env.provenance import versions
 from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
 from blast_env.response.levels import BayDamage
 from blast_env.results import EndReason, ScaledImpulse
-from blast_env.site import (
-    AnyCharge,
-    AnyScenario,
-    Scenario,
-    VehicleCharge,
-    find_scenario,
-)
+from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleCharge, find_scenario
 from blast_env.site.blast_site import WALLS, BlastSite, Charge
 from blast_env.site.sight import in_sight
 from blast_env.site.structures import buildings_of

@@ -11,12 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.io.importing.formats import way_of_json
 from blast_env.io.importing.properties import tags_of
-from blast_env.io.importing.site_map import (
-    WGS84,
-    MapFeature,
-    SiteMap,
-    errors_of,
-)
+from blast_env.io.importing.site_map import WGS84, MapFeature, SiteMap, errors_of
 
 LOCAL: Final = "local"
 """Reference system of coordinates in metres without a place on the Earth."""
