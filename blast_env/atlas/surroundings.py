@@ -174,8 +174,8 @@ class SiteAtlas:
             scale: Cube root of the mass, kg^(1/3).
         """
         charges = np.asarray(charges_m) / scale
-        each_place = max(len(self._walls.middles_m) * len(self._solid.boxes), 1)
-        several = max(_AT_ONCE // each_place, 1)
+        per_place = max(len(self._walls.middles_m) * len(self._solid.boxes), 1)
+        several = max(_AT_ONCE // per_place, 1)
         found = [
             self._found(charges[start : start + several], scale)[0]
             for start in range(0, len(charges), several)
