@@ -63,6 +63,7 @@ def write_weights(weights: Weights, about: Mapping[str, str], path: Path) -> Non
     Raises:
         BlastEnvError: If the file cannot be written.
     """
+    # safetensors writes transposed arrays as they lie in memory, without an error.
     arrays = {name: np.ascontiguousarray(own, np.float32) for name, own in weights.items()}
     with write_atomically(path) as temporary:
         temporary.write_bytes(save(arrays, dict(about)))
