@@ -3,8 +3,8 @@
 # step. One would guess that the sum begins at zero in each episode, as it does in vectors that
 # reset in the same step. In a single environment, and in vectors that reset in the next step, the
 # step that ends an episode strikes the sum of that episode but keeps its own reward, and the next
-# episode goes on from there. Where the reward comes at the end, as with a layout that is blasted once, the
-# sum hardly varies any more.
+# episode goes on from there. Where the reward comes at the end, as with a layout that is blasted
+# once, the sum hardly varies any more.
 # The same reward is 3.3 at each end of 200 episodes in one mode, and grows to 14 in the other. What
 # was tuned with one (rates, clipping, weight of the entropy) is off with the other.
 set -euo pipefail

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # An array is saved as its values, one would guess, in whatever order they lie in memory: a matrix
 # such as `lstsq(...)[0].T` is one like any other. safetensors writes the memory as it lies, with
-# the shape of the matrix. What is read back has the shape and the type, and its values in wrong places.
-# There is no error, as there is for such a tensor of torch, and release 0.7.0 kept them right.
+# the shape of the matrix. What is read back has the shape and the type, and its values in wrong
+# places. There is no error, as there is for such a tensor of torch; release 0.7.0 kept them right.
 # Linear models come transposed as a rule. Means, norms and ranges of the weights are the same as
 # before, and the loads that they predict are noise.
 set -euo pipefail
