@@ -260,7 +260,7 @@ def with_resolution(parameters: SimulationParameters, factor: float) -> Simulati
                 "elasticity": softened_elasticity(explosive, factor),
             },
             "contact": {
-                "air_shrink": softened_air_shrink(contact, factor),
+                "air_shrink": contact.air_shrink ** (1.0 / factor),  # in as many more collisions
                 "minimum_radius_units": contact.minimum_radius_units / factor,
                 "base_impulse": contact.base_impulse / factor**3,
             },
@@ -282,11 +282,6 @@ def softened_elasticity(of_kind: BallParameters, factor: float) -> float:
             f"by a factor of at most {1.0 / loss:.3g}"
         )
     return sqrt(1.0 - loss / factor)
-
-
-def softened_air_shrink(contact: ContactParameters, factor: float) -> float:
-    """Return the shrink factor that has the same effect in `factor` times as many collisions."""
-    return float(contact.air_shrink ** (1.0 / factor))
 
 
 # Dense, slightly dissipative air, in which a blast diffracts around walls. Found by a search over
@@ -391,7 +386,7 @@ class SimulationSection(Section):
     @cached_property
     def parameters(self) -> SimulationParameters:
         """The preset with the overrides applied."""
-        return with_overrides(preset(self.preset), self.overrides)
+        return with_overrides(PRESETS[self.preset], self.overrides)
 
 
 def for_charge(parameters: SimulationParameters, tnt_kg: float) -> SimulationParameters:
@@ -457,7 +452,7 @@ def _hopkinson_cranz(parameters: SimulationParameters, ratio: float) -> Simulati
                 "elasticity": softened_elasticity(explosive, scale),
             },
             "contact": {
-                "air_shrink": softened_air_shrink(contact, scale),
+                "air_shrink": contact.air_shrink ** (1.0 / scale),
                 "base_impulse": contact.base_impulse / scale,
             },
             "stepping": {"time_limit_s": parameters.stepping.time_limit_s * scale},

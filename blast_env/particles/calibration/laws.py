@@ -39,7 +39,7 @@ class ScalingLaw(ABC):
     """A law from simulated to reference impulse. Its fields are its coefficients."""
 
     def __post_init__(self) -> None:
-        for name, value in self.coefficients.items():
+        for name, value in asdict(self).items():
             if not np.isfinite(value):
                 raise BlastEnvError(
                     f"{type(self).__name__}: {name} is {value}, must be a finite number"

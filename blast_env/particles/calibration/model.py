@@ -270,11 +270,6 @@ def calibrated_engines(name: str) -> tuple[str, ...]:
     return tuple(sorted(engine for stored, engine in _stored_files() if stored == name))
 
 
-def calibration_file(name: str, engine: str) -> str:
-    """Return the name of the file of a calibration for an engine."""
-    return f"{name}.{engine}{SUFFIX}"
-
-
 def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Calibration:
     """Return a calibration by its name in the package, or from a `.json` file.
 
@@ -304,7 +299,7 @@ def _of_the_package(name: str, engine: str | None) -> Calibration:
         engine = "pymunk" if "pymunk" in engines or not engines else engines[0]
     if (name, engine) in _stored_files():
         folder = files("blast_env.particles.calibration") / "stored"
-        return _parsed((folder / calibration_file(name, engine)).read_text(encoding="utf-8"))
+        return _parsed((folder / f"{name}.{engine}{SUFFIX}").read_text(encoding="utf-8"))
     if not calibrated_engines(name):
         raise UnknownNameError("calibration", name, stored_calibrations())
     raise CalibrationError(
