@@ -17,11 +17,10 @@ from blast_env.particles.calibration.laws import (
     leave_one_out,
     shape_rms_percent,
 )
+from blast_env.particles.calibration.load_unit import LoadCalibration, LoadUnit
 from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
-    LoadCalibration,
-    LoadUnit,
     load_calibration,
     save_calibration,
     stored_calibrations,

@@ -21,7 +21,6 @@ from blast_env.geometry import Element, layout_text
 from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
-    LoadUnit,
     scenario_calibration,
 )
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
@@ -33,6 +32,7 @@ from blast_env.values import path_of
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
 
+    from blast_env.particles.calibration.load_unit import LoadUnit
     from blast_env.particles.event.engine import EventRun
     from blast_env.particles.pymunk.engine import PymunkRun
     from blast_env.particles.run import BallStates, BlastRun, CollisionArray
@@ -324,11 +324,13 @@ class BlastResult:
         return BlastLoads(tuple(loads), module_impulse_sim=np.array(impulse, dtype=np.float64))
 
     @cached_property
-    def load_unit(self) -> LoadUnit:
+    def load_unit(self) -> "LoadUnit":
         """The unit of the loads in tables and pictures.
 
         It is Pa s if the scenario has a calibration for the engine and any structure was hit.
         """
+        from blast_env.particles.calibration.load_unit import LoadUnit
+
         charge = self.blast.scene.charge
         try:
             return LoadUnit.of(self.obstacles, charge, lambda source: self.impulse(source.name))
