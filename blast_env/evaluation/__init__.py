@@ -11,10 +11,9 @@ if TYPE_CHECKING:
         Assessment,
         BlastCounts,
         BlastEvaluator,
-        BudgetError,
-        DesignProblem,
         Evaluators,
     )
+    from blast_env.evaluation.problem import BudgetError, DesignProblem
     from blast_env.evaluation.questions.grid_error import GridError, convergence_index
     from blast_env.evaluation.questions.reduction import Evaluation, ThreatOutcome
     from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
