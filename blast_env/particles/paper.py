@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from blast_env.particles.calibration.agreement import fit_metrics
 from blast_env.particles.calibration.laws import (
     Fit,
     LinearLaw,
@@ -14,7 +15,6 @@ from blast_env.particles.calibration.laws import (
     ProportionalLaw,
     ScalingLaw,
     fit_linear,
-    fit_metrics,
     fit_power_law,
     fit_proportional,
 )

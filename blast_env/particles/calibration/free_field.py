@@ -14,17 +14,19 @@ from scipy.special import stdtrit
 
 from blast_env.curves import kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.particles.calibration.agreement import (
+    FitMetrics,
+    bootstrap_coefficients,
+    fit_metrics,
+    leave_one_out,
+)
 from blast_env.particles.calibration.laws import (
     Fit,
-    FitMetrics,
     LawName,
     ScalingLaw,
-    bootstrap_coefficients,
     fit_linear,
-    fit_metrics,
     fit_power_law,
     fit_proportional,
-    leave_one_out,
 )
 from blast_env.particles.calibration.model import (
     Calibration,
