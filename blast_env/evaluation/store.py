@@ -6,12 +6,14 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from blast_env.errors import BlastEnvError, BlastEnvWarning, value_text
 from blast_env.evaluation.record import KEY, BlastKey, BlastLoads, BlastRecord
 from blast_env.site import AnyScenario, find_scenario
-from blast_env.store import Store
+
+if TYPE_CHECKING:
+    from blast_env.store import Store
 
 MOST_BYTES: Final = 256_000_000
 """Default maximum size of the file of a store; a blast in the courtyard takes 2 kB."""
@@ -45,7 +47,7 @@ class BlastStore:
         self.size = size
         self._loads: OrderedDict[BlastKey, BlastLoads] = OrderedDict()
         self._complete: OrderedDict[BlastKey, BlastRecord] = OrderedDict()
-        self._file = None if folder is None else Store(Path(folder) / _FILE, most_bytes)
+        self._file = None if folder is None else _opened(Path(folder) / _FILE, most_bytes)
 
     @classmethod
     def of(cls, value: "str | Path | BlastStore | None", size: int = 4096) -> "BlastStore":
@@ -150,3 +152,9 @@ class BlastStore:
 
     def __len__(self) -> int:
         return len(self._loads) if self._file is None else len(self._file)
+
+
+def _opened(path: Path, most_bytes: int) -> "Store":
+    from blast_env.store import Store  # only where blasts go to a file
+
+    return Store(path, most_bytes)
