@@ -532,13 +532,12 @@ class Episodes:
             assert final is not None
             wanted.setdefault(index, {}).update({final: None, (): None})
         # 2. Without those known: of the episode, and of the empty site from an earlier one.
-        due = [
-            (self.running[index], layout)
-            for index, layouts in wanted.items()
-            for layout in layouts
-            if layout not in self.running[index].loads
-            and not self._is_known(self.running[index], layout)
-        ]
+        due = []
+        for index, layouts in wanted.items():
+            episode = self.running[index]
+            if () in layouts:
+                self._recall_bare(episode)
+            due += [(episode, layout) for layout in layouts if layout not in episode.loads]
         if not due:
             return
         # 3. One batch of blasts, and the loads back to their episodes in the same order.
@@ -670,14 +669,12 @@ class Episodes:
         """Return the choices so far for the next module or piece of an episode."""
         return self.running[index].chosen or ActionChoice(self.layouts.legal[index])
 
-    def _is_known(self, episode: Episode, layout: Layout) -> bool:
+    def _recall_bare(self, episode: Episode) -> None:
         """Take the loads without a barrier from an earlier episode of the same threats."""
-        known = None if layout else episode.site.bare.get(episode.loads_key)
-        if known is None:
-            return False
-        episode.loads[()] = known
+        if () in episode.loads or episode.loads_key not in episode.site.bare:
+            return
+        episode.loads[()] = episode.site.bare[episode.loads_key]
         episode.site.evaluator.counts.cache_hits += episode.seeds.size
-        return True
 
     def site_of(self, scenario: Scenario) -> _Site:
         """Return the common parts of a site; those of the last ones are kept.
