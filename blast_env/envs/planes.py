@@ -429,20 +429,22 @@ class ImageObservation:
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (height, width, channels)."""
-        rows, columns = scenario.site.squares
-        channels = len(self.planes.channels_of(scenario))
-        least = max(LEAST_IMAGE_SIDE, channels + 1)
-        return spaces.Box(0, 255, (max(rows, least), max(columns, least), channels), np.uint8)
+        shape = _image_shape(len(self.planes.channels_of(scenario)), *scenario.site.squares)
+        return spaces.Box(0, 255, shape, np.uint8)
 
     def episode(self, observable: Observable) -> "ImageEpisode":
         """Draw the planes that do not change."""
-        shape = self.space(observable.scenario).shape
-        assert shape is not None
         planes = self.planes.episode(observable)
-        static = np.zeros((*shape[:2], len(planes.static)), dtype=np.uint8)
+        static = np.zeros(_image_shape(*planes.static.shape), dtype=np.uint8)
         _, rows, columns = planes.static.shape
         static[:rows, :columns] = np.moveaxis(planes.static, 0, -1)
         return ImageEpisode(planes, static)
+
+
+def _image_shape(channels: int, rows: int, columns: int) -> tuple[int, int, int]:
+    """Return the shape of the image of some planes, with both sides long enough."""
+    least = max(LEAST_IMAGE_SIDE, channels + 1)
+    return max(rows, least), max(columns, least), channels
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observable import Observable
 from blast_env.envs.observations import FeaturesObservation
 from blast_env.envs.planes import GridObservation, ImageObservation, SiteGrid
 from blast_env.errors import BlastEnvError, UnknownNameError
@@ -25,7 +26,7 @@ from blast_env.site import (
     Site,
     load_scenario,
 )
-from tests.catalogue_sites import yard
+from tests.catalogue_sites import item, yard
 from tests.envs.small import make, play, restricted_scenario, same, small_document, small_scenario
 from tests.vehicle_sites import gate_site
 
@@ -331,6 +332,14 @@ def test_a_dictionary_of_ones_own_gets_the_mask_too() -> None:
     observation, info = env.reset(seed=0)
     assert observation in env.observation_space
     assert same(observation["action_mask"], info["action_mask"])
+
+
+def test_images_of_many_planes_have_one_size_with_and_without_a_vehicle() -> None:
+    """Both sides are longer than there are planes, those of absent vehicles among them."""
+    items = [item(f"wall_{number}", 2, 1, 1.0) for number in range(12)]
+    among_vehicles = Observable(yard(items=items), yard().charge, among_vehicles=True)
+    image = ImageObservation().episode(among_vehicles)
+    assert image.static.shape[:2] == (image.static.shape[2] + 1,) * 2
 
 
 # --- Rectangles, lattices and places of charges on the grid of the site.
