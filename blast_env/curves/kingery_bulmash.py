@@ -89,6 +89,16 @@ class _Curve:
         return self.factor_to_si * value
 
 
+def curve_polynomial(quantity: Quantity) -> tuple[float, float, FloatArray, float]:
+    """Return a, b, c and the factor to SI of a hemispherical curve of one segment, for other code.
+
+    The quantity is the factor times 10^(sum c[k] u^k), u = a + b log10 Z, Z of `CURVES_SCALED_M`.
+    """
+    curve = _curves()["hemispherical", quantity]
+    (segment,) = curve.segments
+    return segment.a, segment.b, np.array(segment.c), curve.factor_to_si
+
+
 @overload
 def kingery_bulmash(
     quantity: Quantity, distance_m: float, charge_kg: float, burst: Burst = ...

@@ -159,6 +159,7 @@ class _Site:
         shown: What an agent is shown, by the charges.
         bare: The loads without a barrier, by the threats.
         outcomes: The information before the end, by the number of charges.
+        observed: What the observation keeps for all of them.
     """
 
     evaluator: BlastEvaluator
@@ -168,6 +169,7 @@ class _Site:
     shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
     outcomes: dict[int, Mapping[str, Any]] = field(default_factory=dict)
+    observed: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, task: Task, scenario: Scenario) -> "_Site":
@@ -200,7 +202,7 @@ class _Site:
             return found
         sources = task.threat_model.shown(self.empty.scenario, charges)
         among = bool(task.source.representative.vehicles)
-        observable = Observable(self.empty.scenario, sources, among)
+        observable = Observable(self.empty.scenario, sources, among, self.observed)
         observation = task.observation.episode(observable)
         case = None if task.engine.has_noise else task.case(self.empty.scenario, charges)
         made = _Shown(observable, observation, self.actions.with_sources(sources), charges, case)

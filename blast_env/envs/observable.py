@@ -2,10 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
-from typing import Any, Final, Protocol
+from math import hypot, inf, nan
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from gymnasium import spaces
@@ -23,6 +23,9 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.zone import module_costs_of
+
+if TYPE_CHECKING:  # most sites have no vehicle
+    from blast_env.vehicles.worst_places import PlainGround
 
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""
@@ -55,11 +58,13 @@ class Observable:
         sources: The place of the charge, or its possible places.
         among_vehicles: Whether other scenarios of the environment have vehicles, so that values
             for vehicles are present.
+        of_site: What an observation keeps for all episodes on the site, by its own names.
     """
 
     scenario: Scenario
     sources: tuple[AnySource, ...]
     among_vehicles: bool = False
+    of_site: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def shows_vehicles(self) -> bool:
@@ -71,6 +76,11 @@ class Observable:
         """The vehicles that may bring the charge."""
         return tuple(source for source in self.sources if isinstance(source, VehicleSource))
 
+    @cached_property
+    def diagonal_m(self) -> float:
+        """Diagonal of the site, m."""
+        return hypot(self.scenario.site.width_m, self.scenario.site.height_m)
+
     def reached(self, layout: Layout) -> BoolArray:
         """Return the mask of squares of the site within reach of a vehicle, (rows, columns)."""
         rows, columns = self.scenario.site.squares
@@ -79,10 +89,42 @@ class Observable:
             ground |= vehicle_reach(self.scenario, source, layout).ground(rows, columns)
         return ground
 
+    @cached_property
+    def plain(self) -> "tuple[PlainGround, ...]":
+        """The surroundings of the vehicles, if plain and the same with any layout; else nothing."""
+        scenario = self.scenario
+        if scenario.zone.removable:
+            return ()
+        grounds = [scenario.vehicle_ground(source).plain for source in self.vehicles]
+        plain = [ground for ground in grounds if ground is not None]
+        return tuple(plain) if len(plain) == len(grounds) else ()
+
     def stand_off_m(self, layout: Layout) -> float:
         """Return the least stand-off of a vehicle, m; infinite without vehicles."""
         places = (worst_places(self.scenario, source, layout) for source in self.vehicles)
         return min((place.stand_off_m for place in places), default=inf)
+
+
+def stand_offs_m(episodes: Sequence[Observable], placements: Placements) -> FloatArray:
+    """Return the stand-off in several episodes, m; infinite without vehicles (episodes,)."""
+    found = np.full(len(episodes), inf)
+    # 1. Plain surroundings on the same site at once.
+    groups: dict[tuple[int, tuple[PlainGround, ...]], list[int]] = {}
+    for position, episode in enumerate(episodes):
+        if episode.plain:
+            groups.setdefault((id(placements.rules[position]), episode.plain), []).append(position)
+        elif episode.vehicles:
+            found[position] = nan
+    for (_, grounds), own in groups.items():
+        table, counts = placements.rules[own[0]].obstacles, placements.placed[own]
+        layouts = placements.numbers[own, : counts.max()]
+        table.learn(layouts[np.arange(layouts.shape[1]) < counts[:, np.newaxis]])
+        arrays = table.boxes_m, table.kinds, layouts, counts
+        found[own] = np.min([ground.stand_offs_m(*arrays) for ground in grounds], axis=0)
+    # 2. The others one by one.
+    for position in np.flatnonzero(np.isnan(found)).tolist():
+        found[position] = episodes[position].stand_off_m(placements.layout(position))
+    return found
 
 
 class EpisodeObservation(Protocol):

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import hypot
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -22,6 +21,7 @@ from blast_env.envs.observable import (
     height_share,
     item_values,
     items_left,
+    stand_offs_m,
     stock_shares,
     variant_values,
 )
@@ -129,17 +129,24 @@ class FeaturesObservation:
         Raises:
             BlastEnvError: If the scenario has more than `MOST_STRUCTURES` structures.
         """
-        scenario, zone = observable.scenario, observable.scenario.zone
-        structures = _structures(scenario)
+        scenario, kept = observable.scenario, observable.of_site
+        if "features" not in kept:
+            kept["features"] = _site_features(scenario)
+        of_structures, others, variants = kept["features"]
         charge = _charge_and_corner(scenario, observable.sources)
-        site = (charge, structures[:, :-1].ravel())
-        items = (structures[:, -1], *item_values(zone)) if zone.items else ()
-        constants = np.concatenate((*site, cost_shares(zone).ravel(), *items))
         return FeaturesEpisode(
-            np.clip(constants, 0.0, 1.0).astype(np.float32),
-            variant_values(zone),
+            np.concatenate((charge, of_structures, others)).clip(0.0, 1.0).astype(np.float32),
+            variants,
             observable,
         )
+
+
+def _site_features(scenario: Scenario) -> tuple[FloatArray, FloatArray, Plane]:
+    """Return the constant values of a site: structures, costs and items, and of variants."""
+    structures, zone = _structures(scenario), scenario.zone
+    items = (structures[:, -1], *item_values(zone)) if zone.items else ()
+    others = np.concatenate((cost_shares(zone).ravel(), *items))
+    return structures[:, :-1].ravel(), others, variant_values(zone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,11 +317,9 @@ def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> Fl
 
 def _stand_offs(episodes: Sequence[Observable], placements: Placements) -> FloatArray:
     """Return the stand-off of each episode as a share of the site's diagonal (episodes, 1)."""
-    shares = []
-    for position, episode in enumerate(episodes):
-        site, layout = episode.scenario.site, placements.layout(position)
-        shares.append(episode.stand_off_m(layout) / hypot(site.width_m, site.height_m))
-    return np.array(shares)[:, np.newaxis]
+    diagonals_m = np.array([episode.diagonal_m for episode in episodes])
+    shares: FloatArray = stand_offs_m(episodes, placements) / diagonals_m
+    return shares[:, np.newaxis]
 
 
 OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(

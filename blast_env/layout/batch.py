@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from sys import getrefcount
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from blast_env.layout.placement import LayoutState, LegalLayout
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
 from blast_env.site.zone import BuildZone
+
+if TYPE_CHECKING:
+    from blast_env.layout.obstacles import ObstacleTable
 
 _MOST_ROOMS: Final = 4
 _NOBODY: Final = 3
@@ -50,6 +54,13 @@ class PlacementRules:
         if found is None:
             found = self._elements[number] = self.catalogue.element(number)
         return found
+
+    @cached_property
+    def obstacles(self) -> "ObstacleTable":
+        """What the elements are for vehicles."""
+        from blast_env.layout.obstacles import ObstacleTable  # most sites have no vehicle
+
+        return ObstacleTable(self.scenario, self.catalogue)
 
     @classmethod
     def of(cls, start: LayoutState) -> "PlacementRules":
@@ -229,7 +240,10 @@ class LayoutBatch:
             self.rules if are_all else [self.rules[index] for index in chosen],
             lambda position: self.elements(chosen[position]),
             *(legal, self.occupancy[rows], self.left[rows], self.stock[rows]),
-            *(self.budget_left[rows], self.budget[rows], self._room),
+            *(self.budget_left[rows], self.budget[rows]),
+            self._numbers[rows],
+            self.placed[rows],
+            self._room,
         )
 
     def _room(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -251,6 +265,7 @@ class Placements:
 
     Attributes:
         layout: Returns the elements of one, by its position.
+        numbers: Numbers of the elements of each (layouts, most).
         room: Returns an array of a shape for observations, with any content.
     """
 
@@ -262,6 +277,8 @@ class Placements:
     stock: IntArray
     budget_left: FloatArray
     budget: FloatArray
+    numbers: IntArray
+    placed: IntArray
     room: Callable[[tuple[int, ...]], NDArray[np.float32]]
 
     @classmethod
@@ -269,10 +286,12 @@ class Placements:
         """Return a single layout."""
         left = np.array([[state.stock_left, *state.stocks_left]])
         zone = state.scenario.zone
+        numbers = [state.catalogue.action(element) for element in state.layout]
         return cls(
             *([PlacementRules.of(state)], lambda _: state.layout),
             *(state.legal[np.newaxis], state.occupancy[np.newaxis]),
             *(left, np.array([[zone.stock, *state.catalogue.stocks]])),
             *(np.array([state.budget_left or 0.0]), np.array([zone.budget or np.nan])),
+            *(np.array([numbers], dtype=np.int64), np.array([len(numbers)])),
             lambda shape: np.empty(shape, dtype=np.float32),
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blast_env.geometry import Element, Layout, standing
-from blast_env.layout.placement import LayoutState, check_layout, obstacles_of, usable_cells
+from blast_env.layout.placement import LayoutState, check_layout, usable_cells
 from blast_env.site import (
     AnyCharge,
     Scenario,
@@ -101,7 +101,9 @@ def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCha
 def _obstacles(scenario: Scenario, layout: Sequence[Element]) -> Obstacles:
     if not layout:
         return NOTHING
-    return obstacles_of(scenario.zone, layout, scenario.structures)
+    from blast_env.layout.obstacles import obstacles_of  # most sites have no vehicle
+
+    return obstacles_of(scenario, layout)
 
 
 def build_site(

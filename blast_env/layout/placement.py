@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle, standing
+from blast_env.geometry import Cell, Element, Layout, Measure, Piece
 from blast_env.site.catalogue import Catalogue, ModulePlace, cell_text, element_text
 from blast_env.site.files import AnyScenario, find_scenario
 from blast_env.site.models import Scenario
-from blast_env.site.structures import AnyStructure
-from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import (
     NO_ZONE,
     BuildZone,
@@ -27,7 +25,6 @@ from blast_env.site.zone import (
     reasons_against,
 )
 from blast_env.vehicles.access_way import closing_places, is_open
-from blast_env.vehicles.crash_rating import CrashPiece, Obstacles
 
 
 class LegalLayout(tuple[Element, ...]):
@@ -149,7 +146,9 @@ class LayoutState:
 
     def explain_vehicles(self) -> tuple[str, ...]:
         """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""
-        obstacles = obstacles_of(self._zone, self.layout, self.scenario.structures)
+        from blast_env.layout.obstacles import obstacles_of  # most sites have no vehicle
+
+        obstacles = obstacles_of(self.scenario, self.layout)
         return tuple(
             self.scenario.vehicle_ground(source, self.layout).explain(
                 f"the vehicle with {source.tnt_kg:g} kg TNT", obstacles
@@ -506,31 +505,3 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
     if isinstance(layout, tuple) and not layout:
         return ()
     return LayoutState.of(scenario, layout).layout
-
-
-def obstacles_of(
-    zone: BuildZone, layout: Iterable[Element], structures: Sequence[AnyStructure]
-) -> Obstacles:
-    """Return the obstacles of a layout.
-
-    Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
-    terrace are out of reach, and no obstacles.
-
-    Raises:
-        LayoutError: If there is no such item, or it cannot be turned.
-    """
-    terraces = [structure for structure in structures if structure.carries]
-    stops: list[Rectangle] = []
-    solid: list[Rectangle] = []
-    rated: list[CrashPiece] = []
-    # In the order of their places, so that equal layouts have equal obstacles, and one search.
-    for element in sorted(standing(layout)):
-        variant, (row, column) = zone.catalogue.variant(element), element[:2]
-        rectangle = zone.cells_rectangle_m(row, column, variant.rows, variant.columns)
-        if terraces and ground_below_m(terraces, rectangle) > 0.0:
-            continue
-        if variant.crash_rating is not None:
-            rated.append(CrashPiece(rectangle, variant.crash_rating, element_text(element)))
-        else:
-            (stops if variant.stops_vehicles else solid).append(rectangle)
-    return Obstacles(tuple(stops), tuple(solid), tuple(rated))

@@ -23,7 +23,7 @@ from blast_env.site.parameters import SimulationParameters, SimulationSection
 from blast_env.site.sources import AnySource, VehicleSource
 from blast_env.site.structures import AnyStructure, loaded_walls
 from blast_env.site.zone import BuildZone, Surroundings
-from blast_env.vehicles.crash_rating import CrashPiece
+from blast_env.vehicles.crash_rating import CrashPiece, Obstacles
 
 if TYPE_CHECKING:
     from blast_env.vehicles.drive import VehicleGround
@@ -122,16 +122,35 @@ class Content(Section):
         self, source: VehicleSource, layout: Iterable[Element] = ()
     ) -> "VehicleGround":
         """Return a vehicle's ground without barriers and the structures that a layout removes."""
-        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        zone = self.build_zone
+        away = frozenset() if zone is None or not zone.removable else zone.taken_away(layout)
+        # By identity first: the hash of a vehicle takes longer than the look.
+        known = self._grounds_by_identity.get((id(source), away))
+        if known is not None and known[0] is source:
+            return known[1]
         key = source, away
         if key not in self._grounds:
             if len(self._grounds) >= _MOST_GROUNDS:
                 self._grounds.clear()
             self._grounds[key] = self._ground_of(source, self.structures_with(layout))
+        if len(self._grounds_by_identity) >= _MOST_GROUNDS:
+            self._grounds_by_identity.clear()
+        self._grounds_by_identity[id(source), away] = source, self._grounds[key]
         return self._grounds[key]
 
     @cached_property
     def _grounds(self) -> dict[tuple[VehicleSource, frozenset[str]], "VehicleGround"]:
+        return {}
+
+    @cached_property
+    def _grounds_by_identity(
+        self,
+    ) -> dict[tuple[int, frozenset[str]], tuple[VehicleSource, "VehicleGround"]]:
+        return {}
+
+    @cached_property
+    def obstacles_met(self) -> dict[Element, Obstacles]:
+        """The obstacles that elements of layouts are, each found once; see `obstacles_of`."""
         return {}
 
     def _ground_of(

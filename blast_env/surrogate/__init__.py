@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.surrogate.approach import FEATURES, INPUTS
     from blast_env.surrogate.correction import Correction, apart_m3, stacked
     from blast_env.surrogate.engine import SurrogateEngine
     from blast_env.surrogate.fitting import (
@@ -30,8 +31,9 @@ if TYPE_CHECKING:
         load_surrogate,
         packaged_surrogate,
     )
+    from blast_env.surrogate.points import WallPoints
     from blast_env.surrogate.relations import solid_relations
-    from blast_env.surrogate.walls import FEATURES, INPUTS, SurrogateSite, WallPoints, site_of
+    from blast_env.surrogate.walls import SurrogateSite, site_of
     from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 else:
     __getattr__, __dir__ = on_first_use(__name__)

@@ -26,9 +26,6 @@ SURROGATE: Final = "surrogate"
 
 _NOTES: Final = ("a prediction of the surrogate, not a blast",)
 _GUESSED: Final = Validation(ValidationStatus.APPROXIMATE, "a guess of gas dynamics")
-_SITES_AT_ONCE: Final = 16
-"""Number of sites that pass through the networks together; each takes a megabyte or two."""
-
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
@@ -150,11 +147,10 @@ class SurrogateEngine(Engine):
         compiles = compilation_notice("the surrogate (some 10 s)")
         numbers_of_sites = [*of_sites.values()]
         with nullcontext() if self._sites else compiles:
-            for first in range(0, len(numbers_of_sites), _SITES_AT_ONCE):
-                some = numbers_of_sites[first : first + _SITES_AT_ONCE]
-                for numbers, loads in zip(some, self._loads_of_sites(blasts, some), strict=True):
-                    for number, one in zip(numbers, loads, strict=True):
-                        found[number] = one
+            of_all = self._loads_of_sites(blasts, numbers_of_sites)
+            for numbers, loads in zip(numbers_of_sites, of_all, strict=True):
+                for number, one in zip(numbers, loads, strict=True):
+                    found[number] = one
         return [blast_loads for blast_loads in found if blast_loads is not None]
 
     def _loads_of_sites(

@@ -19,6 +19,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.network import (
     HIDDEN,
     IMPULSE_POWER,
@@ -33,7 +34,7 @@ from blast_env.surrogate.network import (
     log_loads,
 )
 from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.walls import FEATURES, INPUTS, site_of
+from blast_env.surrogate.walls import site_of
 
 MEMBERS: Final = 5
 _BATCH: Final = 6

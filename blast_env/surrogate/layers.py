@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.compilation import compiled
-from blast_env.gas.simd import fill, get, lanes_at, larger, load, place, put, smaller, store
+from blast_env.gas.simd import fill, get, lanes_at, larger, load, place, smaller, store
 from blast_env.gas.state import FUSED
 
 SingleArray = NDArray[np.float32]
@@ -57,82 +57,109 @@ def _silu(at: Any, value: Any) -> Any:
     return half * (near * above / below) + half
 
 
+def _four_rows(bend: Any) -> Any:
+    """Return the function of a layer with a bend."""
+
+    @njit(error_model="numpy", fastmath=FUSED)
+    def rows(
+        given: Any,
+        first: int,
+        inputs: int,
+        weight: Any,
+        outputs: int,
+        base: Any,
+        bases: Any,
+        total: Any,
+        to: int,
+    ) -> None:
+        """Find the outputs of a layer for four rows: two vectors of outputs of each in registers.
+
+        Args:
+            given: Place of the inputs of the rows, one row after the other.
+            first: Index of the first of them.
+            inputs: Number of inputs.
+            weight: Place of the weights (inputs, outputs).
+            outputs: Number of outputs, a multiple of 32.
+            base: Place of what is added to the sums: biases, or biases and part of the sums.
+            bases: The first entry of each row in it (4,).
+            total: Place of the outputs of the rows.
+            to: Index of the first of them.
+        """
+        # Each weight is loaded once for four rows: two vectors of outputs of each are eight sums,
+        # which stay in registers beside the weights.
+        lanes = lanes_at(total)
+        row_0, row_1, row_2, row_3 = first, first + inputs, first + 2 * inputs, first + 3 * inputs
+        base_0, base_1, base_2, base_3 = bases
+        to_0, to_1, to_2, to_3 = to, to + outputs, to + 2 * outputs, to + 3 * outputs
+        for output in range(0, outputs, 2 * lanes):
+            above = output + lanes
+            low_0, high_0 = load(base, base_0 + output), load(base, base_0 + above)
+            low_1, high_1 = load(base, base_1 + output), load(base, base_1 + above)
+            low_2, high_2 = load(base, base_2 + output), load(base, base_2 + above)
+            low_3, high_3 = load(base, base_3 + output), load(base, base_3 + above)
+            for index in range(inputs):
+                low = load(weight, index * outputs + output)
+                high = load(weight, index * outputs + above)
+                value = fill(total, get(given, row_0 + index))
+                low_0, high_0 = value * low + low_0, value * high + high_0
+                value = fill(total, get(given, row_1 + index))
+                low_1, high_1 = value * low + low_1, value * high + high_1
+                value = fill(total, get(given, row_2 + index))
+                low_2, high_2 = value * low + low_2, value * high + high_2
+                value = fill(total, get(given, row_3 + index))
+                low_3, high_3 = value * low + low_3, value * high + high_3
+            store(total, to_0 + output, bend(total, low_0))
+            store(total, to_0 + above, bend(total, high_0))
+            store(total, to_1 + output, bend(total, low_1))
+            store(total, to_1 + above, bend(total, high_1))
+            store(total, to_2 + output, bend(total, low_2))
+            store(total, to_2 + above, bend(total, high_2))
+            store(total, to_3 + output, bend(total, low_3))
+            store(total, to_3 + above, bend(total, high_3))
+
+    return rows
+
+
+@njit(forceinline=True, error_model="numpy")
+def _straight(_at: Any, value: Any) -> Any:
+    return value
+
+
+four_rows: Final = _four_rows(_silu)
+"""Finds the outputs of a layer for four rows."""
+
+four_sums: Final = _four_rows(_straight)
+"""The same without the bend."""
+
+
+PARTS: Final = 16
+"""Parts of the sum of a row, on any processor; the number of inputs is a multiple."""
+
+
 @njit(error_model="numpy", fastmath=FUSED)
-def four_rows(
-    given: Any, inputs: int, weight: Any, outputs: int, base: Any, bases: Any, total: Any
-) -> None:
-    """Find the outputs of a layer for four rows: two vectors of outputs of each in registers.
+def put_parts(given: Any, inputs: int, weight: Any, parts: Any) -> None:
+    """Put parts of the only output of the last layer, without a bend and a bias, for four rows.
 
     Args:
         given: Place of the inputs of the rows, one row after the other.
         inputs: Number of inputs.
-        weight: Place of the weights (inputs, outputs).
-        outputs: Number of outputs, a multiple of 32.
-        base: Place of what is added to the sums: biases, or biases and part of the sums.
-        bases: The first entry of each row in it (4,).
-        total: Place of the outputs of the rows.
+        weight: Place of the weights.
+        parts: Place of the parts (4, PARTS).
     """
-    # Each weight is loaded once for four rows: two vectors of outputs of each are eight sums, which
-    # stay in registers beside the weights.
-    lanes = lanes_at(total)
+    lanes = lanes_at(given)
     row_1, row_2, row_3 = inputs, 2 * inputs, 3 * inputs
-    base_0, base_1, base_2, base_3 = bases
-    for output in range(0, outputs, 2 * lanes):
-        low_0, high_0 = load(base, base_0 + output), load(base, base_0 + output + lanes)
-        low_1, high_1 = load(base, base_1 + output), load(base, base_1 + output + lanes)
-        low_2, high_2 = load(base, base_2 + output), load(base, base_2 + output + lanes)
-        low_3, high_3 = load(base, base_3 + output), load(base, base_3 + output + lanes)
-        for index in range(inputs):
-            low = load(weight, index * outputs + output)
-            high = load(weight, index * outputs + output + lanes)
-            value = fill(total, get(given, index))
-            low_0, high_0 = value * low + low_0, value * high + high_0
-            value = fill(total, get(given, row_1 + index))
-            low_1, high_1 = value * low + low_1, value * high + high_1
-            value = fill(total, get(given, row_2 + index))
-            low_2, high_2 = value * low + low_2, value * high + high_2
-            value = fill(total, get(given, row_3 + index))
-            low_3, high_3 = value * low + low_3, value * high + high_3
-        store(total, output, _silu(total, low_0))
-        store(total, output + lanes, _silu(total, high_0))
-        store(total, outputs + output, _silu(total, low_1))
-        store(total, outputs + output + lanes, _silu(total, high_1))
-        store(total, 2 * outputs + output, _silu(total, low_2))
-        store(total, 2 * outputs + output + lanes, _silu(total, high_2))
-        store(total, 3 * outputs + output, _silu(total, low_3))
-        store(total, 3 * outputs + output + lanes, _silu(total, high_3))
-
-
-@njit(error_model="numpy", fastmath=FUSED)
-def four_sums(given: Any, inputs: int, weight: Any, bias: Any) -> Any:
-    """Return the only output of the last layer, without a bend, for four rows."""
-    zero = one = two = three = bias
-    for index in range(inputs):
-        by = get(weight, index)
-        zero += get(given, index) * by
-        one += get(given, inputs + index) * by
-        two += get(given, 2 * inputs + index) * by
-        three += get(given, 3 * inputs + index) * by
-    return zero, one, two, three
-
-
-@njit(error_model="numpy")
-def _take(rows: Any, first: int, given: Any) -> None:
-    """Copy four rows, the last one again beyond the end."""
-    count, inputs = rows.shape
-    for number in range(ROWS_AT_ONCE):
-        row = min(first + number, count - 1)
-        for index in range(inputs):
-            put(given, number * inputs + index, rows[row, index])
-
-
-def buffers(*widths: int) -> tuple[SingleArray, ...]:
-    """Return room for four rows of each width.
-
-    Compiled code that makes an array itself frees it after its last mention, which is where its
-    place in memory is asked for.
-    """
-    return tuple([np.empty((ROWS_AT_ONCE, width), dtype=np.float32) for width in widths])
+    for part in range(0, PARTS, lanes):
+        sum_0 = sum_1 = sum_2 = sum_3 = fill(given, np.float32(0.0))
+        for index in range(part, inputs, PARTS):
+            by = load(weight, index)
+            sum_0 = load(given, index) * by + sum_0
+            sum_1 = load(given, row_1 + index) * by + sum_1
+            sum_2 = load(given, row_2 + index) * by + sum_2
+            sum_3 = load(given, row_3 + index) * by + sum_3
+        store(parts, part, sum_0)
+        store(parts, PARTS + part, sum_1)
+        store(parts, 2 * PARTS + part, sum_2)
+        store(parts, 3 * PARTS + part, sum_3)
 
 
 def two_layers(
@@ -151,60 +178,43 @@ def two_layers(
         second: Weights of the second layer (members, width, outputs).
         second_bias: Its biases (members, outputs).
     """
-    layers = first, first_bias, second, second_bias
-    given, middle, last = buffers(rows.shape[2], *second.shape[1:])
-    found = np.empty((len(second), rows.shape[1], second.shape[2]), dtype=np.float32)
-    _put_two_layers(rows, *layers, given, middle, last, found)
-    return found
+    given = np.pad(rows, ((0, 0), (0, whole(rows.shape[1]) - rows.shape[1]), (0, 0)))
+    found = np.empty((len(second), given.shape[1], second.shape[2]), dtype=np.float32)
+    middle = np.empty((ROWS_AT_ONCE, second.shape[1]), dtype=np.float32)
+    put_two_layers(given, first, first_bias, second, second_bias, middle, found)
+    return found[:, : rows.shape[1]]
+
+
+def whole(rows: int) -> int:
+    """Return a number of rows, rounded up to a multiple of those that pass together."""
+    return -(-rows // ROWS_AT_ONCE) * ROWS_AT_ONCE
 
 
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
-def _put_two_layers(
+def put_two_layers(
     rows: Any,
     first: Any,
     first_bias: Any,
     second: Any,
     second_bias: Any,
-    given: Any,
     middle: Any,
-    last: Any,
     found: Any,
 ) -> None:
-    """Find the outputs of two layers; see `two_layers`."""
+    """Put the outputs of two layers, of a whole number of rows; see `two_layers`.
+
+    Compiled code that makes an array itself frees it after its last mention, which is where its
+    place in memory is asked for: `middle` has room for four rows between the layers.
+    """
     members, width, outputs = second.shape
     count, inputs = rows.shape[1:]
-    at, between, end = place(given), place(middle), place(last)
+    at, between, end = place(rows), place(middle), place(found)
     same = 0, 0, 0, 0
     for member in range(members):
-        own = rows[member if len(rows) > 1 else 0]
+        own = member * count * inputs if len(rows) > 1 else 0
         weights = place(first[member]), place(second[member])
         biases = place(first_bias[member]), place(second_bias[member])
         for row in range(0, count, ROWS_AT_ONCE):
-            _take(own, row, at)
-            four_rows(at, inputs, weights[0], width, biases[0], same, between)
-            four_rows(between, width, weights[1], outputs, biases[1], same, end)
-            for number in range(min(ROWS_AT_ONCE, count - row)):
-                for index in range(outputs):
-                    found[member, row + number, index] = last[number, index]
-
-
-@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
-def first_sums(rows: SingleArray, weights: SingleArray, bias: SingleArray) -> SingleArray:
-    """Return the sums of a layer before its bend (members, rows, outputs).
-
-    Args:
-        rows: Rows of each member, or of all (members or 1, rows, inputs).
-        weights: Weights (members, inputs, outputs).
-        bias: Biases (members, outputs).
-    """
-    members, inputs, outputs = weights.shape
-    found = np.empty((members, rows.shape[1], outputs), dtype=np.float32)
-    for member in range(members):
-        for row in range(rows.shape[1]):
-            for output in range(outputs):  # a slice would compile NumPy's messages too
-                found[member, row, output] = bias[member, output]
-            for index in range(inputs):
-                value = rows[member if len(rows) > 1 else 0, row, index]
-                for output in range(outputs):
-                    found[member, row, output] += value * weights[member, index, output]
-    return found
+            to = (member * count + row) * outputs
+            given = own + row * inputs
+            four_rows(at, given, inputs, weights[0], width, biases[0], same, between, 0)
+            four_rows(between, 0, width, weights[1], outputs, biases[1], same, end, to)

@@ -6,7 +6,7 @@ is a function of the features of the point and the sum of all messages.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from itertools import zip_longest
 from math import prod
@@ -24,10 +24,12 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
-from blast_env.surrogate.layers import SingleArray, first_sums, two_layers
-from blast_env.surrogate.pieces import Box, Numbers, PieceKnowledge, PointLayers
+from blast_env.surrogate.approach import FEATURES, INPUTS
+from blast_env.surrogate.layers import SingleArray, two_layers
+from blast_env.surrogate.pieces import NetworkLayers, PieceKnowledge, Scales
 from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.walls import FEATURES, INPUTS, Approach, SurrogateSite
+from blast_env.surrogate.rooms import Room
+from blast_env.surrogate.walls import SurrogateSite
 from blast_env.surrogate.ways import SHARES
 
 IntArray = NDArray[np.int64]
@@ -36,8 +38,6 @@ _PACKAGED: Final = Path(__file__).with_name("gas.json")
 
 Asked = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
 """A site, its layouts, and the charge against each of them."""
-
-_Met = tuple[Approach, PieceKnowledge, Numbers]
 
 HIDDEN: Final = 64
 """Width of the two hidden layers."""
@@ -247,26 +247,20 @@ class Networks:
         found: FloatArray = np.einsum("mpi,mi->mp", second, layers.last[..., 0])
         return found + layers.last_bias
 
-    def at_points(self, scaled: FloatArray, heard: SingleArray) -> PointLayers:
-        """Return the layers for points whose open shares and further messages are yet unknown.
-
-        Args:
-            scaled: As for a call; open shares are those on the empty site.
-            heard: Sum of the messages of the structures (members, points, MESSAGE).
-        """
-        # The first layer is linear before its bend, so that the sums over inputs that no layout
-        # changes are made once: W [c, s, m] = W_c c + W_s s + W_m m.
+    def layers(self, power: float) -> NetworkLayers:
+        """Return the layers as compiled code takes them, and the power of the mean over walls."""
         layers, constant = self._layers, FEATURES - SHARES
-        both = np.empty((*heard.shape[:2], constant + MESSAGE), dtype=np.float32)
-        both[..., :constant], both[..., constant:] = scaled[:, :constant], heard
-        weights = np.concatenate((layers.first[:, :constant], layers.first[:, FEATURES:]), axis=1)
-        return PointLayers(
-            first_sums(both, weights, layers.first_bias),
+        of_constants = layers.first[:, :constant], layers.first[:, FEATURES:]
+        return NetworkLayers(
+            layers[:4],
+            np.concatenate(of_constants, axis=1),
+            layers.first_bias,
             np.ascontiguousarray(layers.first[:, constant:]),
             layers.second,
             layers.second_bias,
             np.ascontiguousarray(layers.last[..., 0]),
             np.ascontiguousarray(layers.last_bias[:, 0]),
+            power,
         )
 
 
@@ -317,55 +311,57 @@ class Surrogate:
         Args:
             asked: A site, its layouts and the charge against each of them.
         """
-        parts = [self._parts(*one) for one in asked]
-        found: list[list[FloatArray]] = [[] for _ in asked]
-        for which in range(2):
-            counted = [n for n, (site, *_) in enumerate(asked) if site.counts_peaks or not which]
-            if not counted:
-                break
-            both = self._loads([met for number in counted for met in parts[number][0]], which)
-            first = 0
-            for number in counted:
-                (site, layouts, _), place = asked[number], parts[number][1]
-                after = first + len(layouts) * len(site.protected)
-                found[number] += [
-                    item[first:after].reshape(len(layouts), -1)[place] for item in both
+        found: list[list[FloatArray]] = [[], []]
+        places = [self._put_logs(*one, found) for one in asked]
+        # ln load by each network; the prediction and its spread over the networks, which were
+        # fitted from different beginnings (deep ensembles, Lakshminarayanan et al. 2017).
+        both = [_mean_and_spread(np.concatenate(logs, axis=1)) if logs else () for logs in found]
+        guesses, firsts = [], [0, 0]
+        for (site, layouts, _), place in zip(asked, places, strict=True):
+            own: list[FloatArray] = []
+            for which in range(1 + site.counts_peaks):
+                first = firsts[which]
+                firsts[which] += len(layouts) * len(site.protected)
+                own += [
+                    item[first : firsts[which]].reshape(len(layouts), -1)[place]
+                    for item in both[which]
                 ]
-                first = after
-        return [Guess(*one) for one in found]
+            guesses.append(Guess(*own))
+        return guesses
 
-    def _parts(
-        self, site: SurrogateSite, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
-    ) -> tuple[list[_Met], IntArray]:
-        """Return what is met on a site by charge, and where each layout is among all of them."""
+    def _put_logs(
+        self,
+        site: SurrogateSite,
+        layouts: Sequence[Sequence[Element]],
+        charges: Sequence[Charge],
+        found: Sequence[list[FloatArray]],
+    ) -> IntArray:
+        """Append the logarithms of both kinds of loads on a site (members, loads).
+
+        Returns:
+            Where each layout is among those of the site.
+        """
         # 1. Layouts by their charge, whose paths and relations they share.
         of_charges: dict[Charge, list[int]] = {}
         for number, charge in enumerate(charges):
             of_charges.setdefault(charge, []).append(number)
         # 2. What structures and pieces say to each point: sums of messages (Gilmer et al. 2017,
         # Neural message passing for quantum chemistry), as the order of solids has no meaning.
-        groups = [
-            (site.approach(charge), [site.boxes(layouts[number]) for number in numbers])
-            for charge, numbers in of_charges.items()
-        ]
-        met = [(approach, *self._met(site, approach, boxes)) for approach, boxes in groups]
-        place = np.empty(len(layouts), dtype=np.int64)
-        place[[number for numbers in of_charges.values() for number in numbers]] = range(len(place))
-        return met, place
+        kinds = self._kinds[: 1 + site.counts_peaks]
+        order: list[int] = []
+        for charge, numbers in of_charges.items():
+            order += numbers
+            boxes = [site.boxes(layouts[number]) for number in numbers]
 
-    def _loads(self, met: Sequence[_Met], which: int) -> tuple[FloatArray, FloatArray]:
-        """Return one kind of load on the structures of all layouts, and its spread (loads,)."""
-        power = self._of_loads[which][1]
-        # 3. ln load = ln of Kingery and Bulmash's + what the networks add, at each point.
-        differs = [item.differs(own, which) for _, item, own in met]
-        logs = [np.tile((item.log_impulse, item.log_peak)[which], len(own)) for item, _, own in met]
-        area_m2 = np.concatenate([np.tile(item.area_m2, len(own)) for item, _, own in met])
-        # 4. The mean over the points of each structure, by each network.
-        all_differ: FloatArray = np.concatenate(differs, axis=1)
-        loads = log_loads(all_differ, np.concatenate(logs), area_m2, self._starts(met), power)
-        # 5. The prediction and its spread over the networks, which were fitted from different
-        # beginnings (deep ensembles, Lakshminarayanan et al. 2017).
-        return _mean_and_spread(loads)
+            def make(room: Room, charge: Charge = charge) -> PieceKnowledge:
+                return PieceKnowledge(site.new_approach(charge, room), self._scales, kinds, room)
+
+            with site.memory.known((self, site, charge), make) as (known, room):
+                for own, logs in zip(found, known.log_loads(boxes, room), strict=False):
+                    own.append(logs.reshape(len(logs), -1))
+        place = np.empty(len(layouts), dtype=np.int64)
+        place[order] = range(len(place))
+        return place
 
     def upper_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
@@ -419,49 +415,14 @@ class Surrogate:
             temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
         return path
 
-    @property
-    def _of_loads(self) -> tuple[tuple[Networks, float], ...]:
+    @cached_property
+    def _kinds(self) -> tuple[NetworkLayers, NetworkLayers]:
         """The networks of impulses and of peaks, with the powers of their means over walls."""
-        return (self.impulse, IMPULSE_POWER), (self.peak, PEAK_POWER)
+        return self.impulse.layers(IMPULSE_POWER), self.peak.layers(PEAK_POWER)
 
-    def _met(
-        self, site: SurrogateSite, approach: Approach, layouts: Sequence[Sequence[Box]]
-    ) -> tuple[PieceKnowledge, Numbers]:
-        """Return what is known of the pieces of layouts under one charge, and their numbers."""
-        # What pieces say to points depends on piece and charge alone: it is kept, and layouts that
-        # share pieces share it.
-        kinds = self._of_loads if site.counts_peaks else self._of_loads[:1]
-
-        def sent(related: FloatArray) -> list[SingleArray]:
-            rows = self.related(related.reshape(-1, RELATIONS))
-            of_all = [item.messages(rows) for item, _ in kinds]
-            return [
-                own.reshape(len(own), *related.shape[:2], MESSAGE).swapaxes(0, 1) for own in of_all
-            ]
-
-        def make() -> PieceKnowledge:
-            of_shares = slice(FEATURES - SHARES, FEATURES)
-            bounds = self.mean[of_shares], self.scale[of_shares], _MOST_SPREADS
-            scaled = self.scaled(approach.on_empty)
-            layers = [
-                networks.at_points(scaled, single_array.sum(axis=0))
-                for (networks, _), single_array in zip(kinds, sent(approach.solids), strict=True)
-            ]
-            return PieceKnowledge(
-                approach.ways, bounds, layers, lambda pieces: sent(approach.relations(pieces))
-            )
-
-        return site.memory.numbers_of((self, approach, site.counts_peaks), make, layouts)
-
-    @staticmethod
-    def _starts(met: Sequence[_Met]) -> IntArray:
-        """Return the first row of each structure of each layout (layouts x structures,)."""
-        found, first = [], 0
-        for approach, known, layouts in met:
-            of_layouts = first + known.points * np.arange(len(layouts))
-            found.append((of_layouts[:, np.newaxis] + approach.starts).ravel())
-            first += known.points * len(layouts)
-        return np.concatenate(found)
+    @cached_property
+    def _scales(self) -> Scales:
+        return Scales(self.mean, self.scale, _MOST_SPREADS)
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return the scaled and bounded features of points (points, FEATURES)."""

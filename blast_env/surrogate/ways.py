@@ -20,6 +20,7 @@ from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
+from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, Counts, Room, new_room
 
 STATIONS: Final = (0.2, 0.5, 0.8)
 """Positions of the detours along the straight path, as shares of its length."""
@@ -36,6 +37,9 @@ SHARES: Final = len(STATIONS) * len(FALLS_M) + 1
 
 _REFERENCE_KG: Final = 100.0
 
+_NO_WAY_M: Final = 1e-12
+"""Shorter ways along an axis are none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ways:
@@ -50,21 +54,26 @@ class Ways:
             stations, asides).
         is_straight_open: Whether the straight path is open (points,).
         weights: Total weight of the open paths by each place, for each number of blocked paths
-            (points, stations, asides, heights + 1, decay lengths). Those of a station add up to 1
-            if no path is blocked.
+            (points, stations, distances aside, heights + 1, decay lengths): on both sides of the
+            straight path they are equal. Those of a station add up to 1 if no path is blocked.
     """
 
     start_m: FloatArray
     points_m: FloatArray
     by_m: FloatArray
     by_height_m: FloatArray
-    stopped: IntArray
+    stopped: Counts
     is_straight_open: BoolArray
     weights: FloatArray
 
     @classmethod
     def between(
-        cls, start_m: FloatArray, points_m: FloatArray, tnt_kg: float, solids: FloatArray
+        cls,
+        start_m: FloatArray,
+        points_m: FloatArray,
+        tnt_kg: float,
+        solids: FloatArray,
+        room: Room = new_room,
     ) -> "Ways":
         """Return the paths from a charge to points.
 
@@ -73,25 +82,22 @@ class Ways:
             points_m: The points (points, 3), none above or below the charge.
             tnt_kg: Mass of the charge.
             solids: Left, bottom, right, top, height of each structure, m (solids, 5).
+            room: Gives the arrays.
         """
         points_m = np.ascontiguousarray(points_m)  # one kind of arrays is compiled once
+        shape = len(points_m), len(STATIONS), len(ASIDE_M)
+        by_m, by_height_m = room("places", (*shape, 2), FLOAT), room("heights", shape[:2], FLOAT)
+        stopped, is_straight_open = room("stopped", shape, BYTE), room("open", shape[:1], BOOL)
+        lefts = *shape[:2], (len(ASIDE_M) + 1) // 2, len(ABOVE_M) + 1, len(FALLS_M)
+        weights = room("weights", lefts, FLOAT)
         # 1. Places beside and above the straight path, at some stations of it.
-        towards = points_m - start_m
-        flat_m = np.hypot(towards[:, 0], towards[:, 1])
-        across = np.stack((-towards[:, 1], towards[:, 0]), axis=1) / flat_m[:, np.newaxis]
-        stations, asides = np.array(STATIONS), np.array(ASIDE_M)
-        straight_m = start_m + stations[:, np.newaxis] * towards[:, np.newaxis]
-        by_m = straight_m[:, :, np.newaxis, :2] + (
-            asides[:, np.newaxis] * across[:, np.newaxis, np.newaxis]
-        )
-        by_height_m = np.ascontiguousarray(straight_m[..., 2])
+        _put_places(start_m, points_m, by_m, by_height_m)
         # 2. The weight of each detour falls with its extra length, in units that grow with the
         # charge (Hopkinson and Cranz).
-        falls_m = np.array(FALLS_M) * np.cbrt(tnt_kg / _REFERENCE_KG)
-        weights = _weights_left(start_m, points_m, by_m, by_height_m, falls_m)
+        fall_m = FALLS_M[-1] * float(np.cbrt(tnt_kg / _REFERENCE_KG))
+        _put_weights(start_m, points_m, by_height_m, fall_m, weights)
         # 3. The detours that the structures stop, from the lowest up.
-        stopped = np.zeros(by_m.shape[:3], dtype=np.int64)
-        is_straight_open = np.ones(len(points_m), dtype=bool)
+        stopped[:], is_straight_open[:] = 0, True
         ways = cls(start_m, points_m, by_m, by_height_m, stopped, is_straight_open, weights)
         ways._stop(solids, stopped, is_straight_open)
         return ways
@@ -102,7 +108,8 @@ class Ways:
         Args:
             barrier: Left, bottom, right, top, height of each of its pieces, m (pieces, 5).
         """
-        shares = _open_shares(self.every, self.stopped, self.is_straight_open, self.weights)
+        shares = np.empty((len(self.points_m), SHARES))
+        self.put_shares(shares)
         if barrier is not None:
             behind, shares[behind] = self.behind(barrier)
         return shares
@@ -119,9 +126,11 @@ class Ways:
         stopped, is_straight_open = self.stopped.copy(), self.is_straight_open.copy()
         is_behind = self._stop(barrier, stopped, is_straight_open)
         behind: IntArray = np.flatnonzero(is_behind)
-        return behind, _open_shares(behind, stopped, is_straight_open, self.weights)
+        shares = np.empty((len(behind), SHARES))
+        _put_open_shares(behind, stopped, is_straight_open, self.weights, shares)
+        return behind, shares
 
-    def stopped_by(self, solids: FloatArray) -> tuple[IntArray, BoolArray]:
+    def stopped_by(self, solids: FloatArray) -> tuple[Counts, BoolArray]:
         """Return what each solid alone stops beside the structures.
 
         Args:
@@ -132,87 +141,140 @@ class Ways:
             asides), and whether the straight path is open (solids, points). Several solids
             together stop as many paths as the one that stops most.
         """
-        stopped = np.repeat(self.stopped[np.newaxis], len(solids), axis=0)
-        is_straight_open = np.repeat(self.is_straight_open[np.newaxis], len(solids), axis=0)
-        by = (self.by_m, self.by_height_m)
-        _stop_alone(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
+        stopped = np.empty((len(solids), *self.stopped.shape), dtype=BYTE)
+        is_straight_open = np.empty((len(solids), len(self.points_m)), dtype=BOOL)
+        self.put_stopped_by(solids, stopped, is_straight_open)
         return stopped, is_straight_open
 
-    @property
-    def every(self) -> IntArray:
-        """The indices of all points (points,)."""
-        return np.arange(len(self.points_m))
-
-    def _stop(
-        self, solids: FloatArray, stopped: IntArray, is_straight_open: BoolArray
-    ) -> BoolArray:
-        """Mark the further paths that solids block; return the mask of their points (points,)."""
-        is_behind = np.zeros(len(stopped), dtype=bool)
-        by = (self.by_m, self.by_height_m)
+    def put_stopped_by(
+        self, solids: FloatArray, stopped: Counts, is_straight_open: BoolArray
+    ) -> None:
+        """Put what `stopped_by` returns into arrays."""
+        stopped[:], is_straight_open[:] = self.stopped, self.is_straight_open
+        is_behind = np.zeros(len(self.points_m), dtype=BOOL)
+        by = self.by_m, self.by_height_m
         _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open, is_behind)
+
+    def put_shares(self, shares: FloatArray) -> None:
+        """Put what `shares` returns without a barrier into an array."""
+        every = np.arange(len(self.points_m))
+        _put_open_shares(every, self.stopped, self.is_straight_open, self.weights, shares)
+
+    def _stop(self, solids: FloatArray, stopped: Counts, is_straight_open: BoolArray) -> BoolArray:
+        """Mark the further paths that solids block; return the mask of their points (points,)."""
+        is_behind = np.zeros(len(stopped), dtype=BOOL)
+        by, of_all = (
+            (self.by_m, self.by_height_m),
+            (stopped[np.newaxis], is_straight_open[np.newaxis]),
+        )
+        _stop(self.start_m, self.points_m, *by, solids, *of_all, is_behind)
         return is_behind
 
 
 @compiled(nogil=True, error_model="numpy")
-def _weights_left(
+def _put_places(
+    start_m: FloatArray, points_m: FloatArray, by_m: FloatArray, by_height_m: FloatArray
+) -> None:
+    """Put `Ways.by_m` and `Ways.by_height_m`."""
+    for point in range(len(points_m)):
+        x_m, y_m = points_m[point, 0] - start_m[0], points_m[point, 1] - start_m[1]
+        flat_m = sqrt(x_m * x_m + y_m * y_m)
+        across_x, across_y = -y_m / flat_m, x_m / flat_m
+        for station in range(by_m.shape[1]):
+            share, of_station = STATIONS[station], by_m[point, station]
+            for aside in range(by_m.shape[2]):
+                of_station[aside, 0] = start_m[0] + share * x_m + ASIDE_M[aside] * across_x
+                of_station[aside, 1] = start_m[1] + share * y_m + ASIDE_M[aside] * across_y
+            by_height_m[point, station] = start_m[2] + share * (points_m[point, 2] - start_m[2])
+
+
+_WIDE: Final = 128
+"""Detours of a point at all stations, rounded up, so that a processor weights several at once."""
+
+
+@compiled(nogil=True, error_model="numpy")
+def _put_weights(
     start_m: FloatArray,
     points_m: FloatArray,
-    by_m: FloatArray,
     by_height_m: FloatArray,
-    falls_m: FloatArray,
-) -> FloatArray:
-    """Return `Ways.weights`."""
-    points, stations, asides, _ = by_m.shape
-    aboves, falls = len(ABOVE_M), len(falls_m)
-    left = np.zeros((points, stations, asides, aboves + 1, falls))
-    by_m1, own, per_all = 1.0 / falls_m, np.empty((asides, aboves, falls)), np.empty(falls)
-    to_m2, from_m2 = np.empty((asides, aboves)), np.empty((asides, aboves))
+    fall_m: float,
+    left: FloatArray,
+) -> None:
+    """Put `Ways.weights`, where `fall_m` is the longest decay length."""
+    points, stations, asides, _, falls = left.shape
+    aboves = len(ABOVE_M)
+    own, to_m2, from_m2 = np.zeros((falls, _WIDE)), np.zeros(_WIDE), np.zeros(_WIDE)
     for point in range(points):
         end_m = points_m[point]
-        straight_m = sqrt(_flat_m2(start_m, end_m) + (end_m[2] - start_m[2]) ** 2)
+        flat_m2 = _flat_m2(start_m, end_m)
+        straight_m = sqrt(flat_m2 + (end_m[2] - start_m[2]) ** 2)
+        # 1. The squares of the lengths to each place of a detour, and from it.
+        number = 0
         for station in range(stations):
-            # 1. exp(-extra length / fall) of each detour.
+            to_share, from_share = STATIONS[station] ** 2, (1.0 - STATIONS[station]) ** 2
             for aside in range(asides):
-                corner_m = by_m[point, station, aside]
-                flat_to_m2, flat_from_m2 = _flat_m2(start_m, corner_m), _flat_m2(end_m, corner_m)
+                aside_m2 = ASIDE_M[2 * aside] ** 2
                 for above in range(aboves):
                     z_m = by_height_m[point, station] + ABOVE_M[above]
-                    to_m2[aside, above] = flat_to_m2 + (z_m - start_m[2]) ** 2
-                    from_m2[aside, above] = flat_from_m2 + (z_m - end_m[2]) ** 2
-            _put_exponents(straight_m, to_m2.reshape(-1), from_m2.reshape(-1), by_m1, own)
-            _exponentiate(own.reshape(-1))
-            # 2. Summed from the highest detour down: entry k is what is left if the k lowest are
-            # stopped. 3. As shares of all detours of the station.
-            of_station = left[point, station]
-            per_all[:] = 0.0
-            for aside in range(asides):
-                for above in range(aboves - 1, -1, -1):
-                    for fall in range(falls):
-                        of_station[aside, above, fall] = (
-                            of_station[aside, above + 1, fall] + own[aside, above, fall]
-                        )
-                for fall in range(falls):
-                    per_all[fall] += of_station[aside, 0, fall]
-            for fall in range(falls):
-                per_all[fall] = 1.0 / per_all[fall]
-            for aside in range(asides):
-                for above in range(aboves):
-                    for fall in range(falls):
-                        of_station[aside, above, fall] *= per_all[fall]
-    return left
+                    to_m2[number] = to_share * flat_m2 + aside_m2 + (z_m - start_m[2]) ** 2
+                    from_m2[number] = from_share * flat_m2 + aside_m2 + (z_m - end_m[2]) ** 2
+                    number += 1
+        # 2. exp(-extra length / decay length), for each of these.
+        _put_falls(straight_m, to_m2, from_m2, 1.0 / fall_m, own)
+        number = 0
+        for station in range(stations):
+            _put_left(own, number, left[point, station])
+            number += asides * aboves
 
 
 @njit(error_model="numpy")
-def _put_exponents(
-    straight_m: float, to_m2: FloatArray, from_m2: FloatArray, by_m1: FloatArray, found: FloatArray
+def _put_falls(
+    straight_m: float, to_m2: FloatArray, from_m2: FloatArray, by_m1: float, found: FloatArray
 ) -> None:
-    """Put minus the extra lengths of detours, by each decay length (detours, decay lengths)."""
-    for number in range(len(to_m2)):  # several roots at once
-        to_m2[number] = straight_m - sqrt(to_m2[number]) - sqrt(from_m2[number])
-    exponents = found.reshape(-1, len(by_m1))
-    for number in range(len(to_m2)):
-        for fall in range(len(by_m1)):
-            exponents[number, fall] = to_m2[number] * by_m1[fall]
+    """Put the weights of detours, by each decay length (decay lengths, detours)."""
+    # The decay lengths are whole parts of the longest one, a thirtieth, a tenth and a third: powers
+    # of its exponential give the others.
+    longest = found[3]
+    for number in range(_WIDE):
+        away_m = sqrt(to_m2[number]) + sqrt(from_m2[number])
+        longest[number] = min((straight_m - away_m) * by_m1, 0.0)
+    _exponentiate(longest)
+    for number in range(_WIDE):
+        one = longest[number]
+        three = one * one * one
+        ten = three * three * three * one
+        found[2, number], found[1, number], found[0, number] = three, ten, ten * ten * ten
+
+
+@njit(error_model="numpy")
+def _put_left(own: FloatArray, first: int, of_station: FloatArray) -> None:
+    """Put what is left at a station if the lowest detours by a place are stopped, as shares."""
+    asides, aboves, _ = of_station.shape
+    aboves -= 1
+    # Summed from the highest detour down, four decay lengths side by side. Detours aside are there
+    # twice, on both sides.
+    all_0 = all_1 = all_2 = all_3 = 0.0
+    for aside in range(asides):
+        left_0 = left_1 = left_2 = left_3 = 0.0
+        left = of_station[aside]
+        left[aboves, 0] = left[aboves, 1] = left[aboves, 2] = left[aboves, 3] = 0.0
+        for above in range(aboves - 1, -1, -1):
+            number = first + aside * aboves + above
+            left_0, left_1 = left_0 + own[0, number], left_1 + own[1, number]
+            left_2, left_3 = left_2 + own[2, number], left_3 + own[3, number]
+            left[above, 0], left[above, 1] = left_0, left_1
+            left[above, 2], left[above, 3] = left_2, left_3
+        sides = 1.0 if aside == 0 else 2.0
+        all_0, all_1 = all_0 + sides * left_0, all_1 + sides * left_1
+        all_2, all_3 = all_2 + sides * left_2, all_3 + sides * left_3
+    share_0, share_1, share_2, share_3 = 1.0 / all_0, 1.0 / all_1, 1.0 / all_2, 1.0 / all_3
+    for aside in range(asides):
+        left = of_station[aside]
+        for above in range(aboves):
+            left[above, 0] *= share_0
+            left[above, 1] *= share_1
+            left[above, 2] *= share_2
+            left[above, 3] *= share_3
 
 
 _LEAST: Final = -64.0
@@ -252,46 +314,27 @@ def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _open_shares(
-    chosen: IntArray, stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray
-) -> FloatArray:
-    """Return the shares of open paths to some of the points (chosen, SHARES)."""
+def _put_open_shares(
+    chosen: IntArray,
+    stopped: Counts,
+    is_straight_open: BoolArray,
+    weights: FloatArray,
+    shares: FloatArray,
+) -> None:
+    """Put the shares of open paths to some of the points (chosen, SHARES)."""
     _, stations, asides = stopped.shape
     falls = weights.shape[-1]
-    shares = np.zeros((len(chosen), stations * falls + 1))
-    for number, point in enumerate(chosen):
+    for number in range(len(chosen)):
+        point, own = chosen[number], shares[number]
+        for share in range(stations * falls):
+            own[share] = 0.0
         for station in range(stations):
             for aside in range(asides):
-                left = weights[point, station, aside, stopped[point, station, aside]]
+                below = stopped[point, station, aside]
                 for fall in range(falls):
-                    shares[number, station * falls + fall] += left[fall]
-        shares[number, -1] = is_straight_open[point]
-    return shares
-
-
-@compiled(nogil=True, error_model="numpy")
-def _stop_alone(
-    start_m: FloatArray,
-    points_m: FloatArray,
-    by_m: FloatArray,
-    by_height_m: FloatArray,
-    solids: FloatArray,
-    stopped: IntArray,
-    is_straight_open: BoolArray,
-) -> None:
-    """Mark the paths that each solid blocks; see `Ways.stopped_by`."""
-    is_behind = np.zeros(len(points_m), dtype=np.bool_)
-    for number in range(len(solids)):
-        _stop(
-            start_m,
-            points_m,
-            by_m,
-            by_height_m,
-            solids[number : number + 1],
-            stopped[number],
-            is_straight_open[number],
-            is_behind,
-        )
+                    left = weights[point, station, (aside + 1) // 2, below, fall]
+                    own[station * falls + fall] += left
+        own[stations * falls] = 1.0 if is_straight_open[point] else 0.0
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -301,84 +344,110 @@ def _stop(
     by_m: FloatArray,
     by_height_m: FloatArray,
     solids: FloatArray,
-    stopped: IntArray,
+    stopped: Counts,
     is_straight_open: BoolArray,
     is_behind: BoolArray,
 ) -> None:
     """Mark the paths that solids block, and the points with newly blocked paths.
 
     Paths that are blocked already are skipped.
+
+    Args:
+        start_m: See `Ways`.
+        points_m: See `Ways`.
+        by_m: See `Ways`.
+        by_height_m: See `Ways`.
+        solids: Left, bottom, right, top, height of each solid, m (solids, 5).
+        stopped: `Ways.stopped` by each solid, or by all together (solids or 1, points, ...).
+        is_straight_open: The same of the straight path (solids or 1, points).
+        is_behind: The points (points,).
     """
-    points, stations, asides = stopped.shape
-    met = np.empty((2 * len(solids), 3))
+    start_x_m, start_y_m, start_z_m = start_m[0], start_m[1], start_m[2]
     first = 0
-    while first < points:
+    while first < len(points_m):
         # 1. Points one above the other have the same paths in plan, which are cut once for all.
         last = first + 1
-        while last < points and _flat_m2(points_m[first], points_m[last]) == 0.0:
+        while last < len(points_m) and _flat_m2(points_m[first], points_m[last]) == 0.0:
             last += 1
-        end_m = points_m[first]
+        end_x_m, end_y_m = points_m[first, 0], points_m[first, 1]
         # 2. The straight path of each of them.
-        straight = met[: _intersect(start_m, end_m, solids, met)]
-        for point in range(first, last):
-            if is_straight_open[point] and _is_stopped(start_m[2], points_m[point, 2], straight):
-                is_straight_open[point] = False
-                is_behind[point] = True
+        for solid in range(len(solids)):
+            enter, leave = _cut(start_x_m, start_y_m, end_x_m, end_y_m, solids, solid)
+            number = min(solid, len(stopped) - 1)
+            for point in range(first, last):
+                rise_m, is_open = points_m[point, 2] - start_z_m, is_straight_open[number, point]
+                if (
+                    enter < leave
+                    and is_open
+                    and _lowest_m(start_z_m, rise_m, enter, leave) < solids[solid, 4]
+                ):
+                    is_straight_open[number, point] = False
+                    is_behind[point] = True
         # 3. The detours: to a place beside the path, then on to the point. A higher one clears
         # whatever a lower one does, so that the count of stopped ones only grows.
-        for station in range(stations):
-            for aside in range(asides):
-                corner_m = by_m[first, station, aside]
-                near = _intersect(start_m, corner_m, solids, met)
-                far = near + _intersect(corner_m, end_m, solids, met[near:])
-                if far == 0:
-                    continue
-                to, beyond = met[:near], met[near:far]
-                for point in range(first, last):
-                    above = stopped[point, station, aside]
-                    while above < len(ABOVE_M):
-                        z_m = by_height_m[point, station] + ABOVE_M[above]
-                        if not _is_stopped(start_m[2], z_m, to) and not _is_stopped(
-                            z_m, points_m[point, 2], beyond
-                        ):
-                            break
-                        above += 1
-                    if above > stopped[point, station, aside]:
-                        stopped[point, station, aside] = above
-                        is_behind[point] = True
+        for station in range(by_m.shape[1]):
+            for aside in range(by_m.shape[2]):
+                x_m, y_m = by_m[first, station, aside, 0], by_m[first, station, aside, 1]
+                for solid in range(len(solids)):
+                    enter, leave = _cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
+                    enters, leaves = _cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
+                    if enter >= leave and enters >= leaves:
+                        continue
+                    number, height_m = min(solid, len(stopped) - 1), solids[solid, 4]
+                    for point in range(first, last):
+                        above = stopped[number, point, station, aside]
+                        while above < len(ABOVE_M):
+                            z_m = by_height_m[point, station] + ABOVE_M[above]
+                            to_m, on_m = z_m - start_z_m, points_m[point, 2] - z_m
+                            clears = enter >= leave or (
+                                _lowest_m(start_z_m, to_m, enter, leave) >= height_m
+                            )
+                            if clears and (
+                                enters >= leaves or _lowest_m(z_m, on_m, enters, leaves) >= height_m
+                            ):
+                                break
+                            above += 1
+                        if above > stopped[number, point, station, aside]:
+                            stopped[number, point, station, aside] = above
+                            is_behind[point] = True
         first = last
 
 
-@compiled(nogil=True, error_model="numpy")
-def _intersect(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
-    """Record where a straight line in plan enters and leaves solids, with their heights.
+@njit(error_model="numpy")
+def _cut(
+    start_x_m: float,
+    start_y_m: float,
+    end_x_m: float,
+    end_y_m: float,
+    solids: FloatArray,
+    solid: int,
+) -> tuple[float, float]:
+    """Return where a line in plan enters and leaves a solid, as shares; (1, 0) if it does not."""
+    left, bottom, right, top = (
+        solids[solid, 0],
+        solids[solid, 1],
+        solids[solid, 2],
+        solids[solid, 3],
+    )
+    # Most solids are off the line altogether: no division, and one branch.
+    off_x = (min(start_x_m, end_x_m) >= right) | (max(start_x_m, end_x_m) <= left)
+    off_y = (min(start_y_m, end_y_m) >= top) | (max(start_y_m, end_y_m) <= bottom)
+    if off_x | off_y:
+        return 1.0, 0.0
+    # The part of the line within both slabs of the box (Kay and Kajiya 1986).
+    enter, leave = 0.0, 1.0
+    way = end_x_m - start_x_m
+    if abs(way) >= _NO_WAY_M:
+        one, other = (left - start_x_m) / way, (right - start_x_m) / way
+        enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
+    way = end_y_m - start_y_m
+    if abs(way) >= _NO_WAY_M:
+        one, other = (bottom - start_y_m) / way, (top - start_y_m) / way
+        enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
+    return enter, leave
 
-    Uses the slab method; returns the number of solids on the line.
-    """
-    count = 0
-    for solid in range(len(solids)):
-        # The part of the line within both slabs of the box (Kay and Kajiya 1986).
-        enter, leave = 0.0, 1.0
-        for axis in range(2):
-            way = end_m[axis] - start_m[axis]
-            low, high = solids[solid, axis], solids[solid, axis + 2]
-            if abs(way) < 1e-12:
-                if start_m[axis] <= low or start_m[axis] >= high:
-                    leave = -1.0
-                continue
-            one, other = (low - start_m[axis]) / way, (high - start_m[axis]) / way
-            enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
-        if enter < leave:
-            met[count, 0], met[count, 1], met[count, 2] = enter, leave, solids[solid, 4]
-            count += 1
-    return count
 
-
-@compiled(nogil=True, error_model="numpy")
-def _is_stopped(start_m: float, end_m: float, met: FloatArray) -> bool:
-    """Return whether a line between two heights is below the top of any solid it crosses."""
-    rise_m = end_m - start_m
-    for enter, leave, height_m in met:
-        if min(start_m + enter * rise_m, start_m + leave * rise_m) < height_m:
-            return True
-    return False
+@njit(error_model="numpy")
+def _lowest_m(start_m: float, rise_m: float, enter: float, leave: float) -> float:
+    """Return the least height of a line between two shares of it."""
+    return min(start_m + enter * rise_m, start_m + leave * rise_m)

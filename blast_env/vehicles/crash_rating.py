@@ -186,3 +186,9 @@ class Obstacles(NamedTuple):
 
 NOTHING: Final = Obstacles()
 """The empty site."""
+
+STOPS: Final = 2
+SOLID: Final = 3
+OTHER: Final = 4
+"""What an element of a layout is for a vehicle: it stops it, is driven over, or has its own rules.
+Lower numbers are no obstacles."""

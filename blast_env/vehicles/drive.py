@@ -27,7 +27,7 @@ from blast_env.sections import PointM, Site
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.crash_rating import NOTHING, CrashPiece, Obstacles
 from blast_env.vehicles.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
-from blast_env.vehicles.reach import Reach, ReachQuery, grown_steps, steps_of
+from blast_env.vehicles.reach import Reach, ReachQuery, steps_of
 from blast_env.vehicles.vehicle import Entry, Vehicle
 from blast_env.vehicles.worst_places import PlainGround, WorstPlaces, least_distances_m, worst_of
 
@@ -416,11 +416,8 @@ def _free_speeds(ground: VehicleGround) -> SpeedField:
 def _worst_places(ground: VehicleGround, obstacles: Obstacles) -> WorstPlaces:
     """Return the worst places; the cache is larger than that of drives, which take more memory."""
     if ground.plain is not None and not _any_penetrated(obstacles.rated):
-        half = ground.plain.query.half
-        rated_m = (piece.rectangle for piece in obstacles.rated)
-        found = ground.plain.worst(
-            grown_steps((*obstacles.stops, *rated_m), half), grown_steps(obstacles.solid, half)
-        )
+        rated_m = [piece.rectangle for piece in obstacles.rated]
+        found = ground.plain.worst((*obstacles.stops, *rated_m), obstacles.solid)
         if found is not None:
             return found
     return ground.drive(obstacles).worst

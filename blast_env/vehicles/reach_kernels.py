@@ -33,6 +33,40 @@ def plane_of(boxes: IntArray, level: IntArray, half: int, end: int, step: int, a
 
 
 @njit(error_model="numpy")
+def with_edges(values: IntArray, boxes: IntArray, axis: int) -> IntArray:
+    """Return rising, distinct values with the edges of boxes between the ends of the plane, rising.
+
+    Args:
+        values: The values, which include both ends.
+        boxes: The boxes (boxes, 4), few of them.
+        axis: 0 for x, 1 for y.
+    """
+    edges = np.empty(2 * len(boxes), dtype=np.int64)
+    count = 0
+    for box in range(len(boxes)):
+        for side in (axis, axis + 2):
+            edge, at = boxes[box, side], count
+            if not values[0] < edge < values[-1]:
+                continue
+            while at and edges[at - 1] > edge:
+                edges[at] = edges[at - 1]
+                at -= 1
+            edges[at] = edge
+            count += 1
+    found = np.empty(len(values) + count, dtype=np.int64)
+    size = at = 0
+    for number in range(len(values)):
+        while at < count and edges[at] <= values[number]:
+            if edges[at] < values[number] and (not size or found[size - 1] < edges[at]):
+                found[size] = edges[at]
+                size += 1
+            at += 1
+        found[size] = values[number]
+        size += 1
+    return found[:size]
+
+
+@njit(error_model="numpy")
 def _with_ends(boxes: IntArray, axis: int, first: int, last: int) -> IntArray:
     """Return the distinct edges of boxes between two ends, and the ends, rising."""
     found = np.empty(2 * len(boxes) + 2, dtype=np.int64)
@@ -73,27 +107,37 @@ def reached_parts(
         start[low:high, first:after] = True
     start &= ~is_closed
     # 2. From there to all parts beside that are not closed.
+    reached = _filled(is_closed, start)
+    return start, reached, ~_covered(x, y, solid)
+
+
+@njit(error_model="numpy")
+def _filled(is_closed: BoolArray, start: BoolArray) -> BoolArray:
+    """Return the parts that are connected with some to start from, side by side."""
     rows, columns = is_closed.shape
-    reached = start.copy()
-    waiting = np.empty((rows * columns, 2), dtype=np.int64)
+    # One closed part more on all sides, so that no part is at the border.
+    wide = columns + 2
+    is_over = np.ones((rows + 2) * wide, dtype=np.uint8)
+    waiting = np.empty(rows * columns, dtype=np.int64)
     count = 0
     for row in range(rows):
         for column in range(columns):
+            part = (row + 1) * wide + column + 1
+            is_over[part] = is_closed[row, column] | start[row, column]
             if start[row, column]:
-                waiting[count, 0], waiting[count, 1] = row, column
+                waiting[count] = part
                 count += 1
+    reached = start.copy()
     while count:
         count -= 1
-        row, column = waiting[count]
-        for up, right in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-            other, beside = row + up, column + right
-            if not (0 <= other < rows and 0 <= beside < columns):
-                continue
-            if not is_closed[other, beside] and not reached[other, beside]:
-                reached[other, beside] = True
-                waiting[count, 0], waiting[count, 1] = other, beside
+        part = waiting[count]
+        for beside in (part - wide, part - 1, part + 1, part + wide):
+            if is_over[beside] == 0:
+                is_over[beside] = 1
+                reached[beside // wide - 1, beside % wide - 1] = True
+                waiting[count] = beside
                 count += 1
-    return start, reached, ~_covered(x, y, solid)
+    return reached
 
 
 @njit(error_model="numpy")

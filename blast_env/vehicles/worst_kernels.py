@@ -1,6 +1,6 @@
 """The choice of the worst places of a vehicle's charge, in compiled code."""
 
-from math import hypot, inf, sqrt
+from math import hypot, inf, nan, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -8,7 +8,8 @@ from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
-from blast_env.vehicles.reach_kernels import plane_of, reached_parts
+from blast_env.vehicles.crash_rating import OTHER, SOLID, STOPS
+from blast_env.vehicles.reach_kernels import reached_parts, with_edges
 
 _NEAR: Final = 1e-9
 """Relative error far above that of a squared distance: nearer to a bound, `hypot` decides."""
@@ -89,13 +90,16 @@ def _least(among: BoolArray, values: FloatArray, equal: float) -> BoolArray:
 
 @compiled(nogil=True, error_model="numpy")
 def worst_against(
-    closed: IntArray,
-    solid: IntArray,
+    always: IntArray,
+    never: IntArray,
     starts: IntArray,
-    level: IntArray,
     half: int,
-    ends: tuple[int, int],
-    steps: tuple[int, int],
+    more_m: FloatArray,
+    count: int,
+    cuts_x: IntArray,
+    places_x: IntArray,
+    cuts_y: IntArray,
+    places_y: IntArray,
     per_m: float,
     walls_m: FloatArray,
     middles_m: FloatArray,
@@ -108,13 +112,16 @@ def worst_against(
     They are those that `chosen_places` finds among the places of the whole reach.
 
     Args:
-        closed: See `reached_parts`.
-        solid: See `reached_parts`.
+        always: Grown obstacles of the empty site that stop it (boxes, 4).
+        never: Those that it drives over (boxes, 4).
         starts: See `reached_parts`.
-        level: See `plane_of`.
-        half: See `plane_of`.
-        ends: Width and height of the site.
-        steps: Spacing of regular places along x and y.
+        half: Half of the width of the vehicle.
+        more_m: Further obstacles, m (boxes, 4).
+        count: Number of those that stop it, which are the first.
+        cuts_x: Cuts along x on the empty site; see `plane_of`.
+        places_x: Places along x on the empty site.
+        cuts_y: The same along y.
+        places_y: The same along y.
         per_m: Units in a metre.
         walls_m: Left, bottom, right and top of each loaded wall, at least one (walls, 4).
         middles_m: See `chosen_places`.
@@ -122,70 +129,166 @@ def worst_against(
         least_apart_m: See `chosen_places`.
         equal_m: See `chosen_places`.
     """
-    boxes = np.concatenate((closed, solid, starts))
-    x, lattice_x = plane_of(boxes, level, half, ends[0], steps[0], 0)
-    y, lattice_y = plane_of(boxes, level, half, ends[1], steps[1], 1)
+    more = np.empty(more_m.shape, dtype=np.int64)
+    for box in range(len(more)):
+        for side in range(4):  # as `grown_steps`
+            more[box, side] = round(more_m[box, side] * per_m) + (half if side > 1 else -half)
+    x, lattice_x = with_edges(cuts_x, more, 0), with_edges(places_x, more, 0)
+    y, lattice_y = with_edges(cuts_y, more, 1), with_edges(places_y, more, 1)
+    closed, solid = np.concatenate((always, more[:count])), np.concatenate((never, more[count:]))
     _, reached, clear = reached_parts(x, y, closed, solid, starts)
-    # 1. The places, with the squares of their distances from the nearest wall.
-    is_open = reached & clear
-    places_m = _open_places(x, y, lattice_x, lattice_y, is_open, per_m)
-    count = len(places_m)
-    nearest_m2 = np.full(count, inf)
-    for wall in range(len(walls_m)):
-        left, bottom, right, top = walls_m[wall]
-        for place in range(count):
-            along_x = max(0.0, left - places_m[place, 0], places_m[place, 0] - right)
-            along_y = max(0.0, bottom - places_m[place, 1], places_m[place, 1] - top)
-            nearest_m2[place] = min(nearest_m2[place], along_x * along_x + along_y * along_y)
+    # 1. The squares of the distances of all places from the nearest wall, row by row.
+    x_m, y_m = lattice_x / per_m, lattice_y / per_m
+    nearest_m2, least_m2 = _nearest_m2(
+        x_m, y_m, _parts(x, lattice_x), _parts(y, lattice_y), reached & clear, walls_m
+    )
     # 2. The worst of those that are left, until there are enough or none is left. What is beyond
     #    all doubt by the squares takes no part in the exact comparison.
-    few = np.empty(count, dtype=np.int64)
     chosen_m, distances_m = np.empty((most, 2)), np.empty(most)
     for rank in range(most):
-        least_m2 = nearest_m2[:count].min() if count else inf
+        if rank:
+            least_m2 = _least_apart(
+                x_m, y_m, chosen_m[rank - 1], least_apart_m - equal_m, nearest_m2
+            )
         if least_m2 == inf:
             return chosen_m[:rank], distances_m[:rank]
         bound_m2 = (sqrt(least_m2) * (1.0 + _NEAR) + 2.0 * equal_m) ** 2
-        among = 0
-        for place in range(count):
-            if nearest_m2[place] <= bound_m2:
-                few[among] = place
-                among += 1
-        near_m = places_m[few[:among]]
+        near_m = _up_to(x_m, y_m, nearest_m2, bound_m2)
         worst = chosen_places(
             near_m, _distances_m(walls_m, near_m), middles_m, 1, least_apart_m, equal_m
         )[0]
-        chosen_m[rank] = near_m[worst]
+        chosen_m[rank, 0], chosen_m[rank, 1] = near_m[worst, 0], near_m[worst, 1]
         distances_m[rank] = _distances_m(walls_m, near_m[worst : worst + 1]).min()
-        x_m, y_m, apart_m = near_m[worst, 0], near_m[worst, 1], least_apart_m - equal_m
-        for place in range(count):
-            along_x, along_y = places_m[place, 0] - x_m, places_m[place, 1] - y_m
-            apart_m2 = along_x * along_x + along_y * along_y
-            if apart_m2 <= apart_m * apart_m * (1.0 + _NEAR) and hypot(along_x, along_y) < apart_m:
-                nearest_m2[place] = inf
     return chosen_m, distances_m
 
 
-@njit(error_model="numpy")
-def _open_places(
-    x: IntArray,
-    y: IntArray,
-    lattice_x: IntArray,
-    lattice_y: IntArray,
-    is_open: BoolArray,
+@compiled(nogil=True, error_model="numpy")
+def put_stand_offs(
+    boxes_m: FloatArray,
+    kinds: Any,
+    layouts: IntArray,
+    counts: IntArray,
+    always: IntArray,
+    never: IntArray,
+    starts: IntArray,
+    half: int,
+    cuts_x: IntArray,
+    places_x: IntArray,
+    cuts_y: IntArray,
+    places_y: IntArray,
     per_m: float,
-) -> FloatArray:
-    """Return the points of a lattice that lie in open parts of a plane, row by row (places, 2)."""
-    of_column, of_row = _parts(x, lattice_x), _parts(y, lattice_y)
-    places_m = np.empty((len(lattice_x) * len(lattice_y), 2))
+    walls_m: FloatArray,
+    middles_m: FloatArray,
+    least_apart_m: float,
+    equal_m: float,
+    found: FloatArray,
+) -> None:
+    """Put the distance of the worst place behind each layout; see `PlainGround.stand_offs_m`."""
+    for layout in range(len(layouts)):
+        more_m = np.empty((counts[layout], 4))
+        after = stops = 0
+        is_plain = True
+        for kind in (STOPS, SOLID):
+            for number in layouts[layout, : counts[layout]]:
+                is_plain = is_plain and kinds[number] != OTHER
+                if kinds[number] == kind:
+                    for side in range(4):
+                        more_m[after, side] = boxes_m[number, side]
+                    after += 1
+            stops = after if kind == STOPS else stops
+        found[layout] = nan
+        if is_plain:
+            _, distances_m = worst_against(
+                always,
+                never,
+                starts,
+                half,
+                more_m[:after],
+                stops,
+                cuts_x,
+                places_x,
+                cuts_y,
+                places_y,
+                per_m,
+                walls_m,
+                middles_m,
+                1,
+                least_apart_m,
+                equal_m,
+            )
+            if len(distances_m):
+                found[layout] = distances_m[0]
+
+
+@njit(error_model="numpy")
+def _nearest_m2(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    of_column: IntArray,
+    of_row: IntArray,
+    is_free: BoolArray,
+    walls_m: FloatArray,
+) -> tuple[FloatArray, float]:
+    """Return the square of the distance of each place from the nearest wall (rows, columns).
+
+    It is infinite where no charge goes off. The least of them is returned beside it.
+    """
+    columns = len(x_m)
+    found, lowest = np.empty((len(y_m), columns)), np.full(columns, inf)
+    along_x = np.empty((len(walls_m), columns))
+    for wall in range(len(walls_m)):
+        for column in range(columns):
+            off_m = max(0.0, walls_m[wall, 0] - x_m[column], x_m[column] - walls_m[wall, 2])
+            along_x[wall, column] = off_m * off_m
+    for row in range(len(y_m)):
+        nearest, free = found[row], is_free[of_row[row]]
+        for column in range(columns):
+            nearest[column] = inf
+        for wall in range(len(walls_m)):
+            off_m = max(0.0, walls_m[wall, 1] - y_m[row], y_m[row] - walls_m[wall, 3])
+            along_y, of_wall = off_m * off_m, along_x[wall]
+            for column in range(columns):
+                nearest[column] = min(nearest[column], of_wall[column] + along_y)
+        for column in range(columns):
+            if not free[of_column[column]]:
+                nearest[column] = inf
+        for column in range(columns):
+            lowest[column] = min(lowest[column], nearest[column])
+    return found, lowest.min()
+
+
+@njit(error_model="numpy")
+def _least_apart(
+    x_m: FloatArray, y_m: FloatArray, chosen_m: FloatArray, apart_m: float, nearest_m2: FloatArray
+) -> float:
+    """Leave out the places near a chosen one, and return the least square that is left."""
+    bound_m2 = apart_m * apart_m * (1.0 + _NEAR)
+    lowest = np.full(len(x_m), inf)
+    for row in range(len(y_m)):
+        along_y, nearest = y_m[row] - chosen_m[1], nearest_m2[row]
+        if along_y * along_y <= bound_m2:
+            for column in range(len(x_m)):
+                along_x = x_m[column] - chosen_m[0]
+                if along_x * along_x + along_y * along_y <= bound_m2 and (
+                    hypot(along_x, along_y) < apart_m
+                ):
+                    nearest[column] = inf
+        for column in range(len(x_m)):
+            lowest[column] = min(lowest[column], nearest[column])
+    return float(lowest.min())
+
+
+@njit(error_model="numpy")
+def _up_to(x_m: FloatArray, y_m: FloatArray, nearest_m2: FloatArray, bound_m2: float) -> FloatArray:
+    """Return the places up to a square of the distance, row by row (places, 2)."""
+    found = np.empty((nearest_m2.size, 2))
     count = 0
-    for row in range(len(lattice_y)):
-        for column in range(len(lattice_x)):
-            if is_open[of_row[row], of_column[column]]:
-                places_m[count, 0] = lattice_x[column] / per_m
-                places_m[count, 1] = lattice_y[row] / per_m
+    for row in range(len(y_m)):
+        for column in range(len(x_m)):
+            if nearest_m2[row, column] <= bound_m2:
+                found[count, 0], found[count, 1] = x_m[column], y_m[row]
                 count += 1
-    return places_m[:count]
+    return found[:count]
 
 
 @njit(error_model="numpy")

@@ -5,15 +5,17 @@ A loaded wall is one of a structure's `faces`, whose load counts.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import hypot
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray
-from blast_env.geometry import Wall, WallLine, distances_between_m
+from blast_env.arrays import FloatArray, IntArray
+from blast_env.geometry import Rectangle, Wall, WallLine, distances_between_m
 from blast_env.sections import PointM
-from blast_env.vehicles.reach import PER_M, ReachQuery, Steps, places_apart
+from blast_env.vehicles.reach import PER_M, ReachQuery, places_apart
 from blast_env.vehicles.vehicle import Vehicle
 
 _EQUAL_M: Final = 1e-6
@@ -105,22 +107,36 @@ class PlainGround:
             return None
         return cls(source, query, np.array(walls, dtype=np.float64), _middles_m(walls))
 
-    def worst(self, closed: Steps, solid: Steps) -> WorstPlaces | None:
+    @cached_property
+    def _empty(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """Cuts and places along x and along y on the empty site."""
+        from blast_env.vehicles.reach_kernels import plane_of  # as in `worst`
+
+        always, never, starts, level = self.query.boxes
+        boxes, (width, height) = np.concatenate((always, never, starts)), self.query.ends
+        along_x, along_y = (
+            plane_of(boxes, level, self.query.half, end, places_apart(end), axis)
+            for axis, end in enumerate((width, height))
+        )
+        return *along_x, *along_y
+
+    def worst(
+        self, closed_m: Sequence[Rectangle], solid_m: Sequence[Rectangle]
+    ) -> WorstPlaces | None:
         """Return the worst places against further obstacles; `None` if there are no places.
 
         Args:
-            closed: Obstacles that stop it, grown, micrometres (boxes, 4).
-            solid: Obstacles that it drives over, grown, micrometres (boxes, 4).
+            closed_m: Obstacles that stop it.
+            solid_m: Obstacles that it drives over.
         """
         from blast_env.vehicles.worst_kernels import worst_against  # Numba takes long to import
 
-        query = self.query
-        always, never, starts, level = query.boxes
+        always, never, starts, _ = self.query.boxes
         places_m, distances_m = worst_against(
-            np.concatenate((always, closed)),
-            np.concatenate((never, solid)),
-            *(starts, level, query.half, query.ends),
-            (places_apart(query.ends[0]), places_apart(query.ends[1])),
+            *(always, never, starts, self.query.half),
+            np.array([*closed_m, *solid_m], dtype=np.float64).reshape(-1, 4),
+            len(closed_m),
+            *self._empty,
             *(PER_M, self.walls_m, self.middles_m),
             *(self.source.places, self.source.least_apart_m, _EQUAL_M),
         )
@@ -128,6 +144,34 @@ class PlainGround:
             return None
         places = tuple((x_m, y_m) for x_m, y_m in places_m.tolist())
         return WorstPlaces(self.source, places, tuple(distances_m.tolist()))
+
+    def stand_offs_m(
+        self,
+        boxes_m: FloatArray,
+        kinds: NDArray[np.uint8],
+        layouts: IntArray,
+        counts: IntArray,
+    ) -> FloatArray:
+        """Return the stand-off behind each of several layouts, m (layouts,).
+
+        It is NaN where there are no places, or an element has its own rules.
+
+        Args:
+            boxes_m: Left, bottom, right and top of numbered elements (elements, 4).
+            kinds: What they are (elements,).
+            layouts: Numbers of the elements of each layout (layouts, most).
+            counts: How many each has (layouts,).
+        """
+        from blast_env.vehicles.worst_kernels import put_stand_offs  # as in `worst`
+
+        found = np.empty(len(layouts))
+        always, never, starts, _ = self.query.boxes
+        put_stand_offs(
+            *(boxes_m, kinds, layouts, counts, always, never, starts, self.query.half),
+            *(*self._empty, PER_M, self.walls_m, self.middles_m),
+            *(self.source.least_apart_m, _EQUAL_M, found),
+        )
+        return found
 
 
 def _middles_m(walls: Sequence[Wall]) -> FloatArray:

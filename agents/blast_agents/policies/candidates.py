@@ -24,7 +24,7 @@ from blast_env.layout.build_site import vehicle_reach
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue
-from blast_env.surrogate.walls import WallPoints
+from blast_env.surrogate.points import WallPoints
 from blast_env.units import MODULE_SIDE_M
 
 BEARINGS: Final = 32

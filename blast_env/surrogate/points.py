@@ -1,0 +1,111 @@
+"""Points that represent the protected walls of a site."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray, IntArray
+from blast_env.geometry import WallLine
+from blast_env.site import AnyStructure
+from blast_env.site.blast_site import OUTWARDS
+from blast_env.units import MODULE_SIDE_M
+
+_ALONG_M: Final = 1.0
+_UP_M: Final = 1.5
+"""Spacing of points along and up a wall; larger where there would be too many points."""
+
+MOST_POINTS: Final = 250
+"""Approximate largest number of points on all walls of a site.
+
+More points cost time and do not change the loads, since large walls are far away.
+"""
+
+_BEFORE_M: Final = 0.05
+"""Distance of points in front of their wall, so that the wall does not obstruct their paths."""
+
+
+@dataclass(frozen=True, eq=False)
+class WallPoints:
+    """Points that represent the protected walls.
+
+    Attributes:
+        starts: Index of the first point of each structure (structures,).
+        points_m: Positions (points, 3).
+        outward: Outward normals of their walls, in plan (points, 2).
+        area_m2: Wall area represented by each point (points,).
+        to_edge_m: Distance to the nearest vertical edge of the wall (points,).
+        to_roof_m: Distance to the roof (points,).
+    """
+
+    starts: IntArray
+    points_m: FloatArray
+    outward: FloatArray
+    area_m2: FloatArray
+    to_edge_m: FloatArray
+    to_roof_m: FloatArray
+
+    @classmethod
+    def on(cls, structures: Sequence[AnyStructure], air_m: float) -> "WallPoints":
+        """Place points on structures, about one per metre of length and 1.5 m of height.
+
+        Args:
+            structures: The structures.
+            air_m: Height of structures without a height of their own.
+        """
+        heights_m = [structure.height_m or air_m for structure in structures]
+        apart = _apart(structures, heights_m)
+        tables = [_points(*item, apart) for item in zip(structures, heights_m, strict=True)]
+        starts: IntArray = np.cumsum([0, *(len(table) for table in tables[:-1])])
+        table = np.concatenate(tables) if tables else np.empty((0, 8))
+        places_m, outward = (np.ascontiguousarray(item) for item in (table[:, :3], table[:, 3:5]))
+        columns = (np.ascontiguousarray(table[:, column]) for column in (5, 6, 7))
+        return cls(starts, places_m, outward, *columns)
+
+
+def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArray:
+    """Return position, outward normal, area, and distances to edge and roof (points, 8)."""
+    # 1. Levels of points over the height; 2. along each wall, points in the middle of equal parts,
+    # in the air before it.
+    left, bottom, right, top = structure.rectangle_m
+    rise_m = height_m - structure.base_m
+    levels = max(1, round(rise_m / (_UP_M * apart)))
+    z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
+    rows = []
+    for length_m, (x_out, y_out), line in _walls(structure):
+        number = max(1, round(length_m / (_ALONG_M * apart)))
+        area_m2 = length_m * rise_m / (number * levels)
+        for along_m in (np.arange(number) + 0.5) * length_m / number:
+            if line is not None:
+                before_m = MODULE_SIDE_M if line.is_oblique else _BEFORE_M  # of the steps
+                x_m, y_m = line.point_at(along_m) + before_m * np.array(line.normal)
+            elif x_out:
+                x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
+            else:
+                x_m, y_m = left + along_m, (bottom if y_out < 0 else top) + _BEFORE_M * y_out
+            edge_m = min(along_m, length_m - along_m)
+            rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
+    return np.array(rows)
+
+
+def _walls(
+    structure: AnyStructure,
+) -> Iterator[tuple[float, tuple[float, float], WallLine | None]]:
+    """Yield length, outward normal and, of a polygon, line of each counted wall."""
+    left, bottom, right, top = structure.rectangle_m
+    if structure.footprint is not None:
+        own = (wall for wall in structure.footprint.walls if wall.side in structure.faces)
+        yield from ((wall.length_m, wall.normal, wall) for wall in own)
+        return
+    for face in structure.faces:
+        yield top - bottom if OUTWARDS[face][0] else right - left, OUTWARDS[face], None
+
+
+def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
+    """Return the factor on the spacing of points that keeps their number near `MOST_POINTS`."""
+    # Points are per area: their number falls with the square of their distance.
+    area_m2 = 0.0
+    for structure, height_m in zip(structures, heights_m, strict=True):
+        area_m2 += height_m * sum(length_m for length_m, *_ in _walls(structure))
+    return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
