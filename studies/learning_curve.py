@@ -18,7 +18,7 @@ from blast_env.provenance import versions
 from blast_env.surrogate.fitting import Samples, fit, folds, load_errors
 from blast_env.surrogate.network import Fit
 from blast_env.tables import markdown_table
-from studies.surrogate import DATA, named_rows, samples_of
+from studies.surrogate import DATA, EVERY, MORE_DATA, named_rows, samples_of
 
 BUNDLED: Final = Path("docs/data/gas_blasts.parquet")
 """Blasts on bundled sites, which no fit sees."""
@@ -46,8 +46,8 @@ def main(
     other: Annotated[Path, typer.Option(help="Table of sites that no fit sees.")] = BUNDLED,
     share: Annotated[list[float] | None, typer.Option(help="Shares of the sites.")] = None,
     members: Annotated[int, typer.Option(min=2, help="Networks of a fit.")] = 2,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes over all sites.")] = 8,
-    every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = 8,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over all sites.")] = 4,
+    every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = EVERY,
     seed: int = 0,
 ) -> None:
     """Print the errors of impulses of fits to parts of the sites.
@@ -56,7 +56,7 @@ def main(
     """
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors(), progress_bar("fits") as progress:
-        samples = samples_of(named_rows(data or DATA))
+        samples = samples_of(named_rows(data or (*DATA, *MORE_DATA)))
         others = samples_of(named_rows([other]))
         held_out = folds(samples.site, every, seed)[0]
         shares = sorted(share or SHARES)

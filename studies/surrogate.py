@@ -59,14 +59,21 @@ DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet")
     for name in ("front", "close", "many", "kerb", "street")
 )
-"""Training data of the packaged surrogate: blasts on generated sites."""
+"""Data of the packaged surrogate's first fit: blasts on generated sites."""
+
+MORE_DATA: Final = tuple(
+    Path(f"docs/data/{name}_site_blasts.parquet") for name in ("liked", "module")
+)
+"""Data with which that fit went on."""
+
+EVERY: Final = 8
+"""One of so many sites is held out of the fits."""
 
 _HALVES: Final = 2
 """Parts of the held-out sites: the factor of each is set on the other."""
 
-_EVERY: Final = 10
-_STRIDE: Final = 4000
-"""Between the held-out seeds of two sites."""
+_APART: Final = 10
+"""Between the ranks of two favourites."""
 
 Processes = Annotated[int, typer.Option(min=1)]
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
@@ -154,7 +161,7 @@ class Recipe:
         if self.surrogate is not None:
             guesses = Guesses.of(self.surrogate, LoadCaseSet(site, (threat,), charge=threat.charge))
             liked = improved(guesses, [(), *ruled], self.changes, rng)
-            found += liked[: _EVERY * self.favourites : _EVERY]
+            found += liked[: _APART * self.favourites : _APART]
         if self.draws:
             found += packaged_agent().sample(site, threat.charge, self.draws, seed)
         return list(dict.fromkeys(tuple(sorted(layout)) for layout in found))
@@ -184,7 +191,7 @@ def fit_it(
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
     epochs: Annotated[int, typer.Option(min=1)] = 20,
-    every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = 8,
+    every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = EVERY,
     seed: int = 0,
     device: Annotated[str, typer.Option(help="Device of torch.")] = "cpu",
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
@@ -204,10 +211,7 @@ def fit_it(
         _check_held_out(sum(-(-group // every) for group in groups), every)  # at most so many
         samples = samples_of(named)
         is_more = np.isin(samples.scenario, named["scenario"][of_more].unique())
-        # The sites of --data that are held out stay so, whatever is added.
-        held_out = np.zeros(len(samples), dtype=bool)
-        for own in (~is_more, is_more):
-            held_out[own] = folds(samples.site[own], every, seed)[0] if own.any() else False
+        held_out = held_out_of(samples, is_more, every, seed)
         begun = None if begin_with is None else Begun(load_surrogate(begin_with), ~is_more)
         sites = len(np.unique(samples.site[held_out]))
         _check_held_out(sites, every)
@@ -233,6 +237,23 @@ def fit_it(
         )
         path = replace(fitted, fit=about).save(out)
         print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
+
+
+def held_out_of(samples: Samples, is_more: BoolArray, every: int, seed: int) -> BoolArray:
+    """Return the mask of the samples on held-out sites (samples,).
+
+    Sites of the first data that are held out stay so, whatever is added.
+
+    Args:
+        samples: All samples.
+        is_more: Mask of those of added data (samples,).
+        every: One of so many sites is held out, of the first data and of the added ones.
+        seed: Seed of their order.
+    """
+    held_out = np.zeros(len(samples), dtype=bool)
+    for own in (~is_more, is_more):
+        held_out[own] = folds(samples.site[own], every, seed)[0] if own.any() else False
+    return held_out
 
 
 def _check_held_out(sites: int, every: int) -> None:

@@ -139,6 +139,10 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.first_hour --engine surrogate --threats 24 --by-gas 6 --scenario courtyard"
     " --scenario control_room --scenario visitor_entrance --scenario hotel_forecourt"
     " --scenario school_and_clinic": "--steps 64 --seeds 1 --threats 2 --by-gas 0",
+    "python -m studies.first_hour --engine gas --algorithm MaskablePPO --scenario visitor_entrance"
+    " --steps 8192 --seeds 1 --threats 0 --by-gas 6": "--steps 64 --by-gas 1",
+    "python -m studies.first_hour --engine surrogate --algorithm MaskablePPO --scenario"
+    " visitor_entrance --steps 61440 --seeds 1 --threats 0 --by-gas 6": "--steps 64 --by-gas 1",
     "python -m studies.causes --out docs/pictures/causes.png": "--steps 64 --threats 2 --repeats 1",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
@@ -186,20 +190,19 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.packaged_agent judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street": "--charges 2",
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate blasts --kind kerb_sites --sites 100 --layouts 8 --rules 5"
-    " --cache blasts": "--sites 1 --layouts 1 --rules 1",
-    "python -m studies.blast_table blasts --kind kerb_sites --sites 100 --out blasts.parquet": (
+    "python -m studies.surrogate fit --out first.json": (
+        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
+    ),
+    "python -m studies.surrogate fit --begin-with first.json --more"
+    " docs/data/liked_site_blasts.parquet --more docs/data/module_site_blasts.parquet --epochs 20"
+    " --out surrogate.json": "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4",
+    "python -m studies.surrogate blasts --kind square_sites --sites 100 --layouts 8 --rules 7"
+    " --surrogate first.json --favourites 5 --changes 100 --draws 5 --threats 2 --cache blasts": (
+        "--sites 1 --layouts 1 --rules 1 --favourites 1 --draws 1 --threats 1"
+    ),
+    "python -m studies.blast_table blasts --kind square_sites --sites 100 --out blasts.parquet": (
         "--sites 1"
     ),
-    "python -m studies.surrogate fit --out surrogate.json": (
-        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
-    ),
-    "python -m studies.surrogate fit --begin-with surrogate.json --more"
-    " docs/data/module_site_blasts.parquet --epochs 6 --out more.json": (
-        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
-    ),
-    "python -m studies.surrogate judge courtyard street_junction --charges 3"
-    " --surrogate more.json": "--charges 1 --changes 1",
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites"
     " --kind street_sites --sites 24 --surrogate surrogate.json": (

@@ -20,6 +20,7 @@ TABLES: Final = (
     "kerb_site_blasts",
     "street_site_blasts",
     "module_site_blasts",
+    "liked_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
