@@ -203,6 +203,10 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.blast_table blasts --kind square_sites --sites 100 --out blasts.parquet": (
         "--sites 1"
     ),
+    "python -m studies.learning_curve": (
+        "--data docs/data/close_site_blasts.parquet --other docs/data/many_site_blasts.parquet"
+        " --epochs 1 --share 1.0"
+    ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --kind kerb_sites --kind item_sites"
     " --kind street_sites --sites 24 --surrogate surrogate.json": (
