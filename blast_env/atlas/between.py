@@ -5,8 +5,12 @@ straight way, of variance `width * d1 d2 / (d1 + d2)` in the plane of the obstac
 are its distances from the charge and from the bay, and `width` is a difference of ways (Fresnel's
 zones). The ground mirrors it. What obstacles take away of several bells, narrow and wide, their
 distances and their thickness are the numbers of a law, with the bay's height and angle, since the
-wave that comes over an obstacle meets low bays otherwise than high ones. Without an obstacle
-nothing is taken away.
+wave that comes over an obstacle meets low bays otherwise than high ones. What it takes away on one
+side of the straight way alone, a wall that ends or becomes lower there, leaves more than the same
+share on both. Without an obstacle nothing is taken away.
+
+Of several rows, one behind the other, each counts by the fourth power of what it takes away, so
+that the one that takes most stands for all; what the others take away is a number of its own.
 
 Obstacles throw waves back on a bay, too, as fronts do. The law is of what they leave apart from
 that: its factor is multiplied by those of echoes.
@@ -14,15 +18,18 @@ that: its factor is multiplied by those of echoes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.atlas.echoes import NUMBERS as ECHOES
 
-WIDTHS: Final = (0.03, 0.2, 1.0)
-"""Differences of ways that make the bells, m/kg^(1/3)."""
+WIDTHS: Final = (0.03, 0.2, 1.0, 4.0)
+"""Differences of ways that make the bells, m/kg^(1/3).
+
+The widest one meets what lies beside: the wave that runs into the gap behind a wall from its ends.
+"""
 
 _MIDDLE: Final = 1  # of the widths
 
@@ -33,11 +40,19 @@ m/kg^(1/3), stand in one row."""
 _LEAST: Final = 0.02  # m/kg^(1/3): distances and bells are at least so large
 _REACH: Final = 5.0  # of a bell, in its widths
 _NOTHING: Final = 1e-3  # share of a bell that is not worth a row
-_LEAST_COSINE: Final = 0.61
 _HIGH: Final = (0.25, 1.7)
 _BUILDING: Final = (0.5, 2.0)
-_NEAR: Final = 1.9
 """Ends of the ranges of the blasts, for numbers that hardly change the factor beyond them."""
+
+_OVER: Final = 1.4
+"""Height over the straight way, m/kg^(1/3), that higher obstacles count as: they take more off."""
+
+_CLOSE: Final = (
+    0.4  # m/kg^(1/3) before a bay: where the wave falls into the gap, and is thrown back
+)
+
+_POWER: Final = 4
+"""Of what a row takes away, for its weight among several."""
 
 _BEFORE: Final = 0.04  # m/kg^(1/3) before a wall: what lies behind that does not shield it
 
@@ -48,7 +63,9 @@ class Row:
 
     Attributes:
         taken: Share of each bell that it takes away (bays, widths).
+        sided: What it takes of the right half less what it takes of the left one (bays, widths).
         across: Share of the middle bell that it would take away if it were endlessly high (bays,).
+        over: Height of its top over the straight way times that share, at most `_OVER` (bays,).
         from_charge: Distance from the charge, m/kg^(1/3) (bays,).
         from_bay: Distance from the bay (bays,).
         thickness: Way of the line of sight through it (bays,).
@@ -56,11 +73,18 @@ class Row:
     """
 
     taken: FloatArray
+    sided: FloatArray
     across: FloatArray
+    over: FloatArray
     from_charge: FloatArray
     from_bay: FloatArray
     thickness: FloatArray
     members: IntArray
+
+    @property
+    def gate(self) -> FloatArray:
+        """How much of an obstacle it is, 0 for none (bays,)."""
+        return np.asarray(self.taken.mean(axis=1))
 
 
 def lies_before(bays: FloatArray, normal: FloatArray, boxes: FloatArray) -> BoolArray:
@@ -87,7 +111,8 @@ def rows_between(
         return []
     own = boxes[before]
     corners = np.stack([own[:, [0, 1]], own[:, [2, 1]], own[:, [2, 3]], own[:, [0, 3]]])
-    parts = _Parts.of(np.broadcast_to(charge, bays.shape), bays, own, corners)
+    crossings = _Crossings.of(np.broadcast_to(charge, bays.shape), bays, own, corners)
+    parts = _Parts.of(crossings, own)
     middle = 0.5 * (own[:, [0, 1]] + own[:, [2, 3]]) @ normal[:2]
     order = np.argsort(middle)
     starts = np.flatnonzero(np.diff(middle[order]) > _TOGETHER) + 1
@@ -95,22 +120,31 @@ def rows_between(
     return [row for row in found if row.taken.max() > _NOTHING]
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """What each obstacle takes of the bells of each bay (bays, boxes, ...)."""
+class _Crossings(NamedTuple):
+    """Where the straight ways from the charge to bays cross boxes, or pass them by (bays, boxes).
 
-    taken: FloatArray
-    across: FloatArray
-    along: FloatArray
-    way: FloatArray
+    Attributes:
+        from_charge: Distance from the charge there.
+        from_bay: Distance from the bay.
+        thickness: Way through the box.
+        left: Where the box begins across the way, in plan.
+        right: Where it ends.
+        line: Height of the way there.
+        between: Whether that lies between the charge and the bay.
+    """
+
+    from_charge: FloatArray
+    from_bay: FloatArray
     thickness: FloatArray
+    left: FloatArray
+    right: FloatArray
+    line: FloatArray
+    between: BoolArray
 
     @classmethod
     def of(
         cls, charge: FloatArray, bays: FloatArray, boxes: FloatArray, corners: FloatArray
-    ) -> "_Parts":
-        from scipy.special import ndtr  # takes a while to import
-
+    ) -> "_Crossings":
         # (1) Coordinates along the straight way in plan, s, and across it, e.
         plan = bays[:, :2] - charge[:, :2]
         length = np.maximum(np.linalg.norm(plan, axis=1), _LEAST)
@@ -137,36 +171,62 @@ class _Parts:
         enter, leave = np.clip(enter, 0.0, whole), np.clip(leave, 0.0, whole)
         nearest = np.take_along_axis(s, np.abs(e).argmin(axis=1)[:, np.newaxis], axis=1)[:, 0]
         along = np.where(cuts, 0.5 * (enter + leave), nearest)
-        thickness = np.where(cuts, leave - enter, 0.0)
-        valid = (along > 0.0) & (along < whole) & (~cuts | (leave > enter))
-        # (3) The bell there, and its shares across and up; the ground mirrors it.
-        share = np.clip(along / whole, 0.0, 1.0)
+        # (3) The same in space.
         slope = np.sqrt(1.0 + ((bays[:, 2] - charge[:, 2]) / length) ** 2)[:, np.newaxis]
-        d1 = np.maximum(along * slope, _LEAST)
-        d2 = np.maximum((whole - along) * slope, _LEAST)
         up = charge[:, 2, np.newaxis]
-        line = up + (bays[:, 2, np.newaxis] - up) * share
-        left, right = e.min(axis=1), e.max(axis=1)
+        share = np.clip(along / whole, 0.0, 1.0)
+        return cls(
+            np.maximum(along * slope, _LEAST),
+            np.maximum((whole - along) * slope, _LEAST),
+            np.where(cuts, leave - enter, 0.0),
+            e.min(axis=1),
+            e.max(axis=1),
+            up + (bays[:, 2, np.newaxis] - up) * share,
+            (along > 0.0) & (along < whole) & (~cuts | (leave > enter)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What each obstacle takes of the bells of each bay (bays, boxes, ...)."""
+
+    crossings: _Crossings
+    taken: FloatArray
+    sided: FloatArray
+    across: FloatArray
+    over: FloatArray
+
+    @classmethod
+    def of(cls, found: _Crossings, boxes: FloatArray) -> "_Parts":
+        """Return the shares of the bells at the crossings; the ground mirrors the bells."""
+        from scipy.special import ndtr  # takes a while to import
+
+        zone = found.from_charge * found.from_bay / (found.from_charge + found.from_bay)
         # Only where the widest bell meets the box: most pairs are far aside, or not between.
-        widest = _REACH * np.maximum(np.sqrt(WIDTHS[-1] * d1 * d2 / (d1 + d2)), _LEAST)
-        pairs = np.nonzero(valid & (left < widest) & (right > -widest))
-        taken, endless = np.zeros((*along.shape, len(WIDTHS))), np.zeros(along.shape)
+        widest = _REACH * np.maximum(np.sqrt(WIDTHS[-1] * zone), _LEAST)
+        pairs = np.nonzero(found.between & (found.left < widest) & (found.right > -widest))
+        taken, sided = np.zeros((2, *zone.shape, len(WIDTHS)))
+        endless, over = np.zeros((2, *zone.shape))
         low_up, high_up = boxes[pairs[1], 4], boxes[pairs[1], 5]
-        left, right, line = left[pairs], right[pairs], line[pairs]
-        zone = (d1 * d2 / (d1 + d2))[pairs]
+        left, right, line = (own[pairs] for own in (found.left, found.right, found.line))
         for k, width in enumerate(WIDTHS):
-            bell = np.maximum(np.sqrt(width * zone), _LEAST)
-            across = ndtr(right / bell) - ndtr(left / bell)
+            bell = np.maximum(np.sqrt(width * zone[pairs]), _LEAST)
+            ends = ndtr(right / bell), ndtr(left / bell)
+            across = ends[0] - ends[1]
+            on_right = np.maximum(ends[0], 0.5) - np.maximum(ends[1], 0.5)
 
             def below(height: FloatArray, bell: FloatArray = bell) -> FloatArray:
                 mirrored = ndtr((height - line) / bell) + ndtr((height + line) / bell) - 1.0
                 return np.asarray(np.maximum(mirrored, 0.0))
 
             base = below(low_up) if low_up.any() else np.zeros(len(low_up))
-            taken[pairs[0], pairs[1], k] = across * (below(high_up) - base)
+            up = below(high_up) - base
+            taken[pairs[0], pairs[1], k] = across * up
+            sided[pairs[0], pairs[1], k] = (2.0 * on_right - across) * up
             if k == _MIDDLE:
                 endless[pairs] = across * (1.0 - base)
-        return cls(taken, endless, d1, d2, thickness)
+                over[pairs] = across * np.clip(high_up - line, 0.0, _OVER)
+        return cls(found, taken, sided, endless, over)
 
     def row(self, members: IntArray, indices: IntArray) -> Row:
         """Return a row of some of the obstacles."""
@@ -179,26 +239,28 @@ class _Parts:
 
         return Row(
             np.minimum(taken.sum(axis=1), 1.0),
+            self.sided[:, members].sum(axis=1),
             np.minimum(self.across[:, members].sum(axis=1), 1.0),
-            mean(self.along),
-            mean(self.way),
-            mean(self.thickness),
+            np.minimum(self.over[:, members].sum(axis=1), _OVER),
+            mean(self.crossings.from_charge),
+            mean(self.crossings.from_bay),
+            mean(self.crossings.thickness),
             indices,
         )
 
 
 def numbers_between(
-    row: Row,
+    rows: Sequence[Row],
     charge: FloatArray,
     bays: FloatArray,
     normal: FloatArray,
     high: FloatArray,
     fronts: FloatArray,
 ) -> FloatArray:
-    """Return the numbers of the law of one row (bays, numbers), see `NUMBERS`.
+    """Return the numbers of the law of all rows together (bays, numbers), see `NUMBERS`.
 
     Args:
-        row: The row.
+        rows: The rows, at least one.
         charge: Place of the charge, m/kg^(1/3) (3,), or one for each bay (bays, 3).
         bays: Middles of the bays (bays, 3).
         normal: Outward normal of their wall (3,).
@@ -207,18 +269,30 @@ def numbers_between(
     """
     way = charge - bays
     cosine = way @ normal / np.maximum(np.linalg.norm(way, axis=1), _LEAST)
+    weights = np.stack([row.gate for row in rows]) ** _POWER + 1e-30
+    weights /= weights.sum(axis=0)
+
+    def mean(values: Sequence[FloatArray]) -> FloatArray:
+        return np.asarray(np.einsum("rb,rb...->b...", weights, np.stack(values)))
+
+    taken = mean([row.taken for row in rows])
+    others = np.minimum(np.sum([row.taken for row in rows], axis=0) - taken, 1.0)
     return np.column_stack(
         [
-            row.taken,
-            np.log(row.from_charge),
-            np.log(row.from_bay),
-            np.sqrt(row.thickness),
-            np.broadcast_to(charge[..., 2], len(row.taken)),
-            np.maximum(cosine, _LEAST_COSINE),
+            taken,
+            np.log(mean([row.from_charge for row in rows])),
+            np.log(mean([row.from_bay for row in rows])),
+            np.sqrt(mean([row.thickness for row in rows])),
+            np.broadcast_to(charge[..., 2], len(taken)),
+            cosine,
             np.clip(bays[:, 2], *_HIGH),
             np.clip(high, *_BUILDING),
-            row.across,
-            np.minimum(fronts[:, ECHOES.index("near_beside")], _NEAR),
+            mean([row.across for row in rows]),
+            fronts[:, ECHOES.index("near_beside")],
+            mean([row.over for row in rows]),
+            np.exp(-mean([row.from_bay for row in rows]) / _CLOSE),
+            np.abs(mean([row.sided for row in rows])[:, _MIDDLE:]),
+            others[:, _MIDDLE:],
         ]
     )
 
@@ -234,5 +308,9 @@ NUMBERS: Final[Sequence[str]] = (
     "building_height",
     "across",
     "near_beside",
+    "over",
+    "close",
+    *(f"sided_{width:g}" for width in WIDTHS[_MIDDLE:]),
+    *(f"others_{width:g}" for width in WIDTHS[_MIDDLE:]),
 )
 """Names of the columns of `numbers_between`."""

@@ -19,7 +19,7 @@ from blast_env.arrays import BoolArray, FloatArray
 LOADS: Final = ("impulse", "peak")
 """Order of the loads in arrays of factors."""
 
-_SMALL: Final = 0.02
+SMALL: Final = 0.02
 """Gate below which an obstacle does nothing, in range or not."""
 
 TOLERATED: Final = 1.15
@@ -71,16 +71,6 @@ class Factors(NamedTuple):
         )
         known = self.in_range & other.in_range
         return Factors(middle, middle * np.exp(-below), middle * np.exp(above), known)
-
-    def least(self, other: "Factors") -> "Factors":
-        """Return the smaller one of both for each bay and load."""
-        first = self.middle <= other.middle
-        return Factors(
-            np.where(first, self.middle, other.middle),
-            np.where(first, self.low, other.low),
-            np.where(first, self.high, other.high),
-            self.in_range & other.in_range,
-        )
 
     def where_in_range(self, other: "Factors") -> "Factors":
         """Return these where the law knows the surroundings, others elsewhere."""
@@ -177,7 +167,7 @@ class Law(BaseModel):
         """Return whether all numbers lie between those of the blasts (bays,)."""
         own = self._arrays
         inside = (numbers >= own.least - _BEYOND) & (numbers <= own.most + _BEYOND)
-        return np.asarray(inside.all(axis=1) | (self.gate(numbers) < _SMALL))
+        return np.asarray(inside.all(axis=1) | (self.gate(numbers) < SMALL))
 
     def factors(self, numbers: FloatArray) -> Factors:
         """Return the factors on the loads of bays, given their numbers (bays, numbers).

@@ -1,9 +1,8 @@
 """The surroundings of bays on a site: which laws of the atlas apply, and by how much.
 
-Of several rows between charge and bay the one that takes most counts alone; it and echoes multiply.
-`python -m studies.atlas rules` compares that with gas dynamics. Where the law of rows does not know
-one, it takes nothing off the load; echoes outside the range of their law are the nearest ones in
-it.
+Rows between charge and bay count together; they and echoes multiply. Where the law of rows does not
+know them, they take nothing off the load; echoes outside the range of their law are the nearest
+ones in it.
 """
 
 import re
@@ -79,7 +78,8 @@ class Walls:
         normals: Their outward normals (bays, 3).
         structures: Name of the structure of each bay.
         high_m: Height of it (bays,).
-        ends_m: Distances of the middles from both ends of the wall (bays, 2).
+        ends_m: Distances of the middles from the ends of the wall on the right and on the left,
+            seen from outside (bays, 2).
         before_m: How far they lie before the wall (bays,).
     """
 
@@ -236,19 +236,19 @@ class SiteAtlas:
             wall.echoes_of(solid.boxes[before & solid.is_building]) if has_pieces else fronts
         )
         factors, notes = Factors.none(count), [near]
-        governing: list[tuple[Factors, str]] = []
         free = solid.only(~adjoins)
-        for row in between.rows_between(wall.charge, wall.middles, wall.normal, free.boxes):
+        rows = between.rows_between(wall.charge, wall.middles, wall.normal, free.boxes)
+        if rows:
             numbers = between.numbers_between(
-                row, wall.charge, wall.middles, wall.normal, wall.high, fronts
+                rows, wall.charge, wall.middles, wall.normal, wall.high, fronts
             )
             own = self._laws.between.factors(numbers)
-            tallest = row.members[int(free.boxes[row.members, 5].argmax())]
-            governing.append((own, f"behind {free.names[tallest]}"))
-            factors = factors.least(own.where_known())
-        for own, name in governing:
-            counts = own.middle[:, 0] <= factors.middle[:, 0]  # the row that takes most
-            notes.append(_Note.of(name, own, counts))
+            factors = own.where_known()
+            most = np.argmax([row.gate for row in rows], axis=0)  # the row that takes most
+            for index, row in enumerate(rows):
+                tallest = row.members[int(free.boxes[row.members, 5].argmax())]
+                name = f"behind {free.names[tallest]}"
+                notes.append(_Note.of(name, own, every).only(most == index))
         for law, name in (
             (self._laws.opposite, "a front opposite"),
             (self._laws.beside, "walls beside"),
@@ -280,13 +280,11 @@ class SiteAtlas:
 
     def _edges(self, wall: "_Wall") -> tuple[Factors, "_Note"]:
         """Return what the edges of a wall do, and a note if the charge is too near to it."""
-        law = self._laws.edges
-        numbers = edges.numbers_of_edges(
-            wall.charge, wall.middles, wall.normal, wall.ends, wall.high
-        )
-        against = edges.is_against(law, numbers)
+        own = wall.charge, wall.middles, wall.normal, wall.ends
+        numbers, to_wall = edges.numbers_of_edges(*own, wall.high), edges.to_the_wall(*own)
+        against = edges.is_against(to_wall)
         note = _Note("a charge that stands against the wall", ~against, np.zeros_like(against))
-        return edges.factors_of_edges(law, numbers), note
+        return edges.factors_of_edges(self._laws.edges, numbers, to_wall), note
 
     def _away(self, wall: "_Wall", solid: Solid, structure: str) -> "_Around":
         """Return the shadow on a wall of a rectangular building that faces away.
@@ -350,6 +348,10 @@ class _Note:
         """Return the note on factors; those that change nothing are in range, and do not count."""
         changed = np.abs(np.log(factors.middle)).max(axis=1) > _NOTICED
         return cls(name, factors.in_range | ~changed, changed & counts)
+
+    def only(self, chosen: BoolArray) -> "_Note":
+        """Return the note for some of the bays."""
+        return _Note(self.name, self.in_range | ~chosen, self.counts & chosen)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from studies.atlas.runs import (
     COARSE,
     COLUMNS,
     FINE,
+    OF_A_ROUND,
     groups_in,
     groups_of,
     restore,
@@ -163,7 +164,11 @@ def check(
         for name in names:
             if name not in known:
                 raise UnknownNameError("family", name, known)
-        asked = [(name, first + number) for name in names for number in range(groups)]
+        asked = [
+            (name, first + number)
+            for name in names
+            for number in range(groups * OF_A_ROUND.get(name, 1))
+        ]
         with progress_bar("blasts") as progress:
             for done, (name, number) in enumerate(asked):
                 run_group(name, number, False, out)

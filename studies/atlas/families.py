@@ -307,6 +307,93 @@ def _canopy(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
+_PIECES: Final[Ranges] = {
+    "high": (0.15, 0.9),
+    "low": (0.1, 1.0),
+    "length": (0.25, 1.1),
+    "count": (1.0, 6.0),
+    "pattern": (0.0, 1.0),
+    "share": (0.1, 0.97),
+    "shift": (-0.6, 0.6),
+    "step": (-1.5, 1.5),
+    "second": (-0.8, 1.0),
+    "wing": (-1.2, 0.8),
+}
+
+
+def _of_pieces(first: int, drawn: Numbers, pattern: float) -> tuple[Box, ...]:
+    """Return a row of wall pieces of two heights, with gaps, every other one a step aside."""
+    high, length = _modules(drawn["high"], 2), _modules(drawn["length"], 3)
+    heights = (high, high, _modules(drawn["low"] * drawn["high"], 1), 0)
+    count, step = int(drawn["count"]), round(drawn["step"])
+    left = round((drawn["shift"] - 0.5) * count * length)
+    parts: list[Box] = []
+    for index in range(count):
+        pattern = 4.0 * pattern % 4.0
+        top = heights[int(pattern)]
+        if top or (index == count - 1 and not parts):
+            x = first + (index % 2) * step
+            parts.append(Box(x, left + index * length, 1, length, top or high))
+    return tuple(parts)
+
+
+def _pieces(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a facade alone, then behind pieces of two heights in one row or two, with a wing."""
+    box, numbers, up = _facade(site)
+    scenes = [Scene(numbers, box, up=up)]
+    for drawn in obstacles:
+        step = abs(round(drawn["step"]))
+        room = box.x - 2 - step
+        x = min(max(round(drawn["share"] * box.x), _NEAREST + step), room)
+        parts = _of_pieces(x, drawn, drawn["pattern"])
+        rows = 1
+        if drawn["second"] > 0.0:
+            other = min(round(x + drawn["second"] * (box.x - x)), room)
+            if other > x + 2 * step + 1:
+                parts += _of_pieces(other, drawn, 61.0 * drawn["pattern"] % 1.0)
+                rows = 2
+        if drawn["wing"] > 0.1:  # from the end of the first row back, to the charge's side
+            deep = _modules(drawn["wing"])
+            y = min(*(part.y for part in parts), 1 - _NEAREST) - 1
+            parts += (Box(x - deep, y, deep, 1, _modules(drawn["high"], 2)),)
+        own = _scaled(from_charge=x, high=_modules(drawn["high"], 2))
+        more = {"rows": float(rows), "pieces": float(len(parts))}
+        scenes.append(Scene({**numbers, **own, **more}, box, others=parts, up=up))
+    return scenes
+
+
+def _beyond(site: Numbers, _: list[Numbers]) -> list[Scene]:
+    """Return a front in the open that begins beyond the charge, nearly in its line."""
+    away, begin = _modules(site["away"]), _modules(site["begin"], _NEAREST)
+    high, length = _modules(site["facade_height"], 6), _modules(site["length"], 12)
+    front = Box(begin, away, length, 4, high)
+    own = _scaled(away=away, begin=begin, facade_height=high, length=length)
+    return [Scene(own, front, ("south",))]
+
+
+def _slant(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
+    """Return a front along which the wave comes, alone, then with walls across and along it.
+
+    The front begins beside the charge or farther along.
+    """
+    away, high = _modules(site["away"], _NEAREST), _modules(site["facade_height"], 6)
+    begin = round(site["begin"] * MODULES)
+    front = Box(begin, away, _STREET_MODULES - begin, 4, high)
+    numbers = _scaled(away=away, facade_height=high, begin=begin)
+    scenes = [Scene(numbers, front, ("south",))]
+    for drawn in obstacles:
+        at, top = _modules(drawn["at"], _NEAREST), _modules(drawn["height"])
+        length = _modules(drawn["length"], 2)
+        y = min(round(drawn["across"] * away), away - 2)
+        # Across the way, up to the front or less, or along it.
+        wall = Box(at, y, length, 1, top)
+        if drawn["turn"] < 0.6:
+            wall = Box(at, y + 1 - length, 1, length, top)
+        own = {**_scaled(at=at, height=top, length=length), "turn": drawn["turn"]}
+        scenes.append(Scene({**numbers, **own}, front, ("south",), (wall,)))
+    return scenes
+
+
 def _table() -> Iterator[Family]:
     near = {**_FACADE, "distance": (1.3, 4.0)}
     level = {name: own for name, own in near.items() if name != "raised"}
@@ -363,14 +450,37 @@ def _table() -> Iterator[Family]:
     yield Family("canopy", "a canopy, storeys that project, a podium", near, canopy, 6, _canopy)
     wide = {**_FACADE, "distance": (1.3, 9.0), "width": (0.5, 6.0), "aside": (0.0, 4.0)}
     wide = {**wide, "facade_height": (0.4, 3.0), "raised": (-0.8, 0.8)}
+    long = {**wide, "distance": (2.0, 12.0), "width": (5.0, 13.0), "aside": (0.0, 7.0)}
+    yield Family("wide", "a wide facade in the open", long, {}, 0, _open)
+    broad = {**long, "distance": (1.3, 4.0), "facade_height": (0.5, 3.5), "aside": (0.0, 5.0)}
+    yield Family("broad", "a wide facade near the charge", broad, {}, 0, _open)
     raised = {**_FACADE, "raised": (0.05, 1.2)}
     yield Family("raised", "a raised charge, without and with a wall", raised, _WALL, 5, _raised)
     yield Family("open", "a facade in the open", wide, {}, 0, _open)
     far = {**_FACADE, "distance": (5.0, 14.0), "facade_height": (0.4, 2.0), "raised": (-0.8, 0.4)}
     low = {**_WALL, "height": (0.05, 1.0), "share": (0.02, 0.95), "second": (-1.0, 0.0)}
     yield Family("far", "a wall before a facade far away", far, low, 6, _walls)
+    distant = {**_PIECES, "high": (0.05, 0.8), "share": (0.02, 0.6), "second": (-0.2, 0.3)}
+    title = "pieces before a facade far away"
+    yield Family("distant", title, {**far, "raised": (-0.8, 0.0)}, distant, 6, _pieces)
     close = {**wide, "distance": (0.33, 1.3), "width": (0.5, 5.0), "aside": (0.0, 2.5)}
     yield Family("near", "a facade near the charge", close, {}, 0, _open)
+    yield Family("pieces", "pieces of two heights, in one row or two", near, _PIECES, 9, _pieces)
+    close = {**_PIECES, "length": (0.3, 1.8), "share": (0.72, 0.99), "second": (-3.0, 0.9)}
+    close = {**close, "high": (0.15, 1.2), "wing": (-1.0, 0.0)}
+    yield Family("shaft", "pieces just before a facade", near, close, 9, _pieces)
+    past = {"away": (0.08, 0.7), "begin": (0.35, 2.2), "length": (1.0, 4.5)}
+    past = {**past, "facade_height": (0.5, 2.0)}
+    yield Family("beyond", "a facade beside whose end the charge stands", past, {}, 0, _beyond)
+    along = {**along, "begin": (-1.0, 1.5)}
+    slant = {
+        "at": (0.33, 3.5),
+        "height": (0.08, 1.2),
+        "length": (0.2, 1.2),
+        "across": (0.0, 1.0),
+        "turn": (0.0, 1.0),
+    }
+    yield Family("slant", "a wall before a front along the way", along, slant, 6, _slant)
 
 
 FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _table()})

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.atlas import Factors, Law, Laws
+from blast_env.atlas import Law, Laws
 from blast_env.atlas.between import numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
 from blast_env.atlas.laws import TOLERATED
@@ -14,7 +14,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from studies.atlas.families import FAMILIES
 from studies.atlas.fitting import RECIPES
-from studies.atlas.samples import Bays, Group, less_echoes, row_between, scenes_with_loads
+from studies.atlas.samples import Bays, Group, less_echoes, numbers_of, rows_of, scenes_with_loads
 from studies.atlas.sites import LARGE, SiteLoads
 
 Row = tuple[str, ...]
@@ -148,17 +148,20 @@ def cell_rows(
 
 def rule_rows(scenes: Sequence[Bays], known: Laws) -> Iterator[Row]:
     """Yield one row per rule for two rows of obstacles: error of ln(factor) and its mean."""
-    factors, measured = [], []
+    factors, together, measured = [], [], []
     for bays in scenes:
-        rows = row_between(bays) if bays.family in ("wall", "rows") else []
+        rows = rows_of(bays) if bays.family in ("wall", "rows", "pieces") else []
         if len(rows) == 2:
-            factors.append(np.stack([known.between.log_factors(own) for own in rows]))
+            each = [known.between.log_factors(numbers_of(bays, [row])) for row in rows]
+            factors.append(np.stack(each))
+            together.append(known.between.log_factors(numbers_of(bays, rows)))
             (less,) = less_echoes([bays], [known.opposite, known.beside])
             measured.append(less.log_change)
     both, target = np.concatenate(factors, axis=1), np.concatenate(measured)
     for name, found in (
         ("the product", both.sum(axis=0)),
         ("the one that takes most", both.min(axis=0)),
+        ("the law of both", np.concatenate(together)),
     ):
         off = found - target
         errors = np.sqrt((off**2).mean(axis=0))
@@ -227,10 +230,9 @@ def wall_case(known: Laws, boxes_m: Sequence[Sequence[float]]) -> tuple[float, f
     scale = float(np.cbrt(_KG))
     boxes, high = np.array(boxes_m, dtype=float) / scale, np.full(len(bays), 6.0 / scale)
     fronts = numbers_of_echoes(charge, bays, normal, boxes, high)
-    factors = Factors.none(len(bays))
-    for row in rows_between(charge, bays, normal, boxes):
-        numbers = numbers_between(row, charge, bays, normal, high, fronts)
-        factors = factors.least(known.between.factors(numbers).where_known())
+    rows = rows_between(charge, bays, normal, boxes)
+    numbers = numbers_between(rows, charge, bays, normal, high, fronts)
+    factors = known.between.factors(numbers).where_known()
     for law in (known.opposite, known.beside):
         factors = factors.times(law.factors(fronts))
     middle, low, high_end = (float(part[:, 0].mean()) for part in factors[:3])

@@ -28,6 +28,8 @@ from studies.atlas.samples import (
     scenes_with_loads,
 )
 
+Names = np.ndarray[Any, np.dtype[np.str_]]
+
 FOLDS: Final = 6
 """Shares into which the groups are divided; each is left out once."""
 
@@ -36,10 +38,13 @@ _DIGITS: Final = 5
 _STEPS: Final = 600
 _SHARES: Final = (0.0, 0.3, 0.7, 1.5, 3.0, 6.0)
 _HELD: Final = 0.9
+_ALIKE: Final = MappingProxyType(
+    {"far": "wall", "distant": "pieces"}
+)  # of few groups: held as one family
 _LEAST: Final = 1e-3
 
 
-def folds_of(groups: np.ndarray[Any, np.dtype[np.str_]], seed: int = 0) -> IntArray:
+def folds_of(groups: Names, seed: int = 0) -> IntArray:
     """Return the fold of each sample; a group is in one fold (samples,)."""
     names, index = np.unique(groups, return_inverse=True)
     order = np.random.default_rng(seed).permutation(len(names))
@@ -75,7 +80,8 @@ def fit(
         left[~rest] = law.log_factors(numbers[~rest])
     law = _fitted(numbers, target, columns, gates, hidden, decay)
     kept = np.isin(found.family, [*judged])
-    law = _with_intervals(law, numbers[kept], found.family[kept], (target - left)[kept], wider)
+    off = (target - left)[kept]
+    law = _with_intervals(law, numbers[kept], found.family[kept], found.group[kept], off, wider)
     width = law.width(numbers)[:, np.newaxis]
     below, above = np.array(law.below), np.array(law.above)
     inside = (target >= left - width * below) & (target <= left + width * above)
@@ -97,20 +103,27 @@ def fit(
 def _with_intervals(
     law: Law,
     numbers: FloatArray,
-    family: np.ndarray[Any, np.dtype[np.str_]],
+    family: Names,
+    group: Names,
     off: FloatArray,
     wider: Sequence[str],
 ) -> Law:
     """Return a law with the narrowest intervals that hold 90 % of the bays of each family.
 
+    They hold one standard error of that share more, over the groups of the family: bays of one
+    group are alike, and those of new designs are to be held as well.
+
     Args:
         law: The law without intervals.
         numbers: Numbers of the bays.
         family: Their families.
+        group: Their groups.
         off: What the law leaves of ln(factor) where it was not fitted (bays, loads).
         wider: See `fit`.
     """
-    families = [family == name for name in np.unique(family)]
+    kind = np.array([_ALIKE.get(name, name) for name in family.tolist()])
+    kinds = [kind == name for name in np.unique(kind)]
+    errors = [np.sqrt(_HELD * (1.0 - _HELD) / len(np.unique(group[own]))) for own in kinds]
     best, least = law, np.inf
     # (1) Ends of the pooled intervals for each set of widths; (2) how much wider they must be for
     # the family that they hold worst; (3) the narrowest ones in the mean.
@@ -122,7 +135,13 @@ def _with_intervals(
         low, high = np.quantile(off / width, _ENDS, axis=0)
         ends = np.maximum(-low, _LEAST), np.maximum(high, _LEAST)
         reach = np.maximum(-off / (width * ends[0]), off / (width * ends[1]))
-        more = np.max([np.quantile(reach[one], _HELD, axis=0) for one in families], axis=0)
+        more = np.max(
+            [
+                np.quantile(reach[own], min(_HELD + error, 1.0), axis=0)
+                for own, error in zip(kinds, errors, strict=True)
+            ],
+            axis=0,
+        )
         wide = float((width * more * (ends[0] + ends[1])).mean())
         if wide < least:
             below, above = (_pair(more * end + 10.0**-_DIGITS) for end in ends)
@@ -272,11 +291,11 @@ RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
             ("near_opposite", "near_beside"),
         ),
         "between": Recipe(
-            ("wall", "posts", "rows", "raised", "far"),
+            ("wall", "posts", "rows", "raised", "far", "pieces", "shaft", "distant", "slant"),
             samples_between,
             between.NUMBERS,
             {name: _THIRD for name in between.NUMBERS if name.startswith("taken")},
-            ("root_thickness", "charge_height"),
+            ("close", "charge_height"),
             less=("opposite", "beside"),
             also=("tee",),
             hidden=20,

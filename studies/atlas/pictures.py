@@ -32,6 +32,9 @@ SHOWN: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
         "rows": ("height", "height of the houses", "length"),
         "canopy": ("depth", "depth of what projects", "level"),
         "raised": ("raised", "height of the charge", "distance"),
+        "pieces": ("high", "height of the higher pieces", "from_charge"),
+        "shaft": ("high", "height of the higher pieces", "from_charge"),
+        "slant": ("height", "height of the wall", "away"),
         "open": ("facade_height", "height of the front", "distance"),
     }
 )

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import process_time
+from types import MappingProxyType
 from typing import Any, Final
 
 import pandas as pd
@@ -22,7 +23,11 @@ COARSE: Final = GasEngine(cell_m=MODULE_SIDE_M)
 FINE: Final = GasEngine(cell_m=0.5 * MODULE_SIDE_M)
 """Halved cells."""
 
-_OF_A_ROUND: Final = {"shadow": 4, "rows": 2, "tee": 2, "open": 2, "near": 2}
+OF_A_ROUND: Final = MappingProxyType(
+    {"shadow": 4, "rows": 2, "tee": 2, "open": 2, "near": 2, "beyond": 2}
+)
+"""Groups of a round of families whose groups have few blasts; one of the others."""
+
 _CHECKED: Final = (0, 5, 2)  # families of a round on halved cells; the last one in every other
 _DIGITS: Final = 2
 
@@ -36,7 +41,7 @@ def rounds(names: Sequence[str], count: int) -> Iterator[tuple[str, int, bool]]:
     checked = [name for name in names if FAMILIES[name].obstacles or name == "shadow"]
     for number in range(count):
         for name in names:
-            share = _OF_A_ROUND.get(name, 1)
+            share = OF_A_ROUND.get(name, 1)
             for group in range(number * share, (number + 1) * share):
                 yield name, group, False
         several = _CHECKED[: (2 + number % 2) * bool(checked)]

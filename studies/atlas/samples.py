@@ -8,11 +8,11 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas.attached import numbers_of_attached
-from blast_env.atlas.between import numbers_between, rows_between
+from blast_env.atlas.between import WIDTHS, Row, numbers_between, rows_between
 from blast_env.atlas.echoes import numbers_of_echoes
 from blast_env.atlas.edges import NUMBERS as EDGES
-from blast_env.atlas.edges import numbers_of_edges
-from blast_env.atlas.laws import Law
+from blast_env.atlas.edges import is_against, numbers_of_edges, to_the_wall
+from blast_env.atlas.laws import SMALL, Law
 from blast_env.atlas.shadow import numbers_of_shadow
 from blast_env.curves import Ways, in_the_open
 from studies.atlas.scenes import CUBE_ROOT, MODULES
@@ -22,9 +22,6 @@ Group = Mapping[str, Any]
 
 LEAST_DISTANCE: Final = 1.3
 """Nearest bays of the law of edges, m/kg^(1/3); walls may be breached from 1.7 inwards."""
-
-LEAST_TO_WALL: Final = 0.3
-"""Least distance of the charge from their wall; its source needs 0.33."""
 
 OPEN: Final = "open"
 """Family of walls in the open; the first scenes of the others count among them."""
@@ -211,29 +208,32 @@ def fronts_of(bays: Bays) -> FloatArray:
     return numbers_of_echoes(bays.charge, bays.middles, bays.normals[0], bays.boxes, bays.high)
 
 
-def row_between(bays: Bays) -> list[FloatArray]:
-    """Return the numbers of every row between."""
-    normal, fronts = bays.normals[0], fronts_of(bays)
-    return [
-        numbers_between(row, bays.charge, bays.middles, normal, bays.high, fronts)
-        for row in rows_between(bays.charge, bays.middles, normal, bays.boxes)
-    ]
+def rows_of(bays: Bays) -> list[Row]:
+    """Return the rows between."""
+    return rows_between(bays.charge, bays.middles, bays.normals[0], bays.boxes)
+
+
+def numbers_of(bays: Bays, rows: Sequence[Row]) -> FloatArray:
+    """Return the numbers of some rows together (bays, numbers)."""
+    return numbers_between(
+        rows, bays.charge, bays.middles, bays.normals[0], bays.high, fronts_of(bays)
+    )
 
 
 def samples_between(bays: Bays) -> tuple[FloatArray, BoolArray]:
-    """Return the numbers of obstacles between, of scenes with one row."""
-    rows = row_between(bays)
-    if len(rows) != 1:
-        return np.empty((len(bays.middles), 0)), np.zeros(len(bays.middles), dtype=bool)
-    return rows[0], np.ones(len(bays.middles), dtype=bool)
+    """Return the numbers of obstacles between, of bays from which they take something away."""
+    rows, count = rows_of(bays), len(bays.middles)
+    if not rows:
+        return np.empty((count, 0)), np.zeros(count, dtype=bool)
+    found = numbers_of(bays, rows)
+    return found, np.asarray(found[:, : len(WIDTHS)].mean(axis=1) >= SMALL)
 
 
 def samples_echoes(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of echoes, of bays that no obstacle hides."""
-    normal = bays.normals[0]
     found = fronts_of(bays)
     hidden = np.zeros(len(found), dtype=bool)
-    for row in rows_between(bays.charge, bays.middles, normal, bays.boxes):
+    for row in rows_of(bays):
         hidden |= row.taken[:, 0] > 0.5
     return found, ~hidden
 
@@ -255,13 +255,15 @@ def samples_shadow(bays: Bays) -> tuple[FloatArray, BoolArray]:
 def samples_edges(bays: Bays) -> tuple[FloatArray, BoolArray]:
     """Return the numbers of walls in the open, of those that face the charge."""
     low, high = bays.judged[:2], bays.judged[2:4]
-    found = np.empty((len(bays.middles), len(EDGES)))
+    found, to_wall = np.empty((len(bays.middles), len(EDGES))), np.empty(len(bays.middles))
     for normal in np.unique(bays.normals, axis=0):
         own = (bays.normals == normal).all(axis=1)
         along = int(abs(normal[0]) > 0.5)  # a wall to the west or east runs along y
         place = bays.middles[own, along]
-        ends = np.column_stack([place - low[along], high[along] - place])
-        found[own] = numbers_of_edges(bays.charge, bays.middles[own], normal, ends, bays.high[own])
+        ends = np.column_stack([high[along] - place, place - low[along]])
+        if normal[0] - normal[1] < 0.0:  # to the west or north it goes on to the left
+            ends = ends[:, ::-1]
+        lies = bays.charge, bays.middles[own], normal, ends
+        found[own], to_wall[own] = numbers_of_edges(*lies, bays.high[own]), to_the_wall(*lies)
     distance = np.linalg.norm(bays.charge - bays.middles, axis=1)
-    to_wall = ((bays.charge - bays.middles) * bays.normals).sum(axis=1)
-    return found, (distance >= LEAST_DISTANCE) & (to_wall >= LEAST_TO_WALL)
+    return found, (distance >= LEAST_DISTANCE) & ~away_from(bays) & ~is_against(to_wall)

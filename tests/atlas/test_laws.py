@@ -32,11 +32,11 @@ def behind(boxes: FloatArray, charge: FloatArray = CHARGE, bays: FloatArray = BA
     """Return what the rows of some boxes do, in and out of range."""
     high = np.full(len(bays), 1.3)
     fronts = numbers_of_echoes(charge, bays, TOWARDS, boxes, high)
-    found = Factors.none(len(bays))
-    for row in rows_between(charge, bays, TOWARDS, boxes):
-        numbers = numbers_between(row, charge, bays, TOWARDS, high, fronts)
-        found = found.least(packaged_laws().between.factors(numbers).where_known())
-    return found
+    rows = rows_between(charge, bays, TOWARDS, boxes)
+    if not rows:
+        return Factors.none(len(bays))
+    numbers = numbers_between(rows, charge, bays, TOWARDS, high, fronts)
+    return packaged_laws().between.factors(numbers).where_known()
 
 
 def test_without_an_obstacle_the_factor_is_exactly_one() -> None:
@@ -56,7 +56,7 @@ def test_without_an_obstacle_the_factor_is_exactly_one() -> None:
 def test_a_vanishing_wall_does_nothing() -> None:
     found = behind(wall(0.001))
     assert found.middle == pytest.approx(1.0, abs=0.01)
-    assert (found.high - found.low).max() < 0.05
+    assert (found.high - found.low).max() < 0.08
 
 
 @given(st.floats(0.05, 1.4), st.floats(0.5, 4.0), st.floats(0.01, 0.5))
@@ -75,6 +75,32 @@ def test_higher_walls_protect_more_and_gaps_less() -> None:
     lower, upper = half.copy(), half.copy()
     lower[0, 3], upper[0, 1] = -0.25, 0.25
     assert behind(np.concatenate([lower, upper])).middle[0, 0] > left[2] + 0.05
+
+
+def test_a_wall_of_two_heights_protects_between_both() -> None:
+    both = np.concatenate([wall(0.9), wall(0.3)])
+    both[0, 3] = both[1, 1] = 0.1  # high on the right of the first bay, low on its left
+    low, found, high = (behind(boxes).middle[:, 0] for boxes in (wall(0.3), both, wall(0.9)))
+    assert (high < found + 0.03).all()
+    assert (found < low + 0.03).all()
+    assert low.mean() - high.mean() > 0.2
+
+
+def test_rows_count_in_any_order_and_a_second_one_does_not_harm() -> None:
+    near, far = wall(0.6, at=0.5), wall(0.4, at=1.4)
+    first, second = (behind(np.concatenate(pair)) for pair in ((near, far), (far, near)))
+    assert first.middle == pytest.approx(second.middle, rel=1e-12)
+    assert first.middle[:, 0].mean() < behind(near).middle[:, 0].mean() + 0.02
+
+
+def test_a_wall_across_the_way_along_a_front_shields_it() -> None:
+    """The wave comes along the facade, which no blast of straight ways shows."""
+    charge, across = np.array([1.8, -2.4, 0.0]), np.array([[1.2, -1.3, 2.2, -1.2, 0.0, 0.7]])
+    found = behind(across, charge)
+    assert found.in_range.all()
+    assert found.middle[:2, 0].max() < 0.9
+    grazing = np.array([2.1, -8.0, 0.0])  # steeper than any blast
+    assert not behind(across + np.array([0.0, -4.0, 0.0, -4.0, 0.0, 0.0]), grazing).in_range.any()
 
 
 def test_factors_are_continuous() -> None:
@@ -118,7 +144,7 @@ def test_the_errors_of_the_fit_are_in_the_file() -> None:
     laws = packaged_laws()
     for law in (laws.between, laws.opposite, laws.shadow, laws.attached):
         for name, family in law.families.items():
-            if name == "far":
+            if name in ("far", "distant"):
                 assert max(family.before[0], family.error[0]) < 0.1
             else:
                 assert family.error[0] < 0.6 * family.before[0]
@@ -151,4 +177,4 @@ def test_a_wall_by_gas_lies_in_the_interval_of_the_law() -> None:
     found = behind(box, bays=bays)
     low, high = (float(part[:, 0].mean()) for part in (found.low, found.high))
     assert low < behind_it / alone < high
-    assert high / low < 2.0
+    assert high / low < 2.2

@@ -301,6 +301,17 @@ def test_a_charge_against_a_wall_counts_up_to_twice_its_mass_and_says_so() -> No
         assert "a charge that stands against the wall" in bay.unknown
 
 
+def test_a_charge_beyond_the_end_of_a_wall_does_not_stand_against_it() -> None:
+    """Half a metre before the line of the wall: 1.5 m from it, and 6 m beyond its end."""
+    for y_m, is_against in ((13.0, True), (8.0, False)):
+        site = yard(tnt_kg=100.0, position_m=[29.5, y_m])
+        plain, found = (screen(site, (), (), own).threats[0] for own in (None, packaged_laws()))
+        for bay, other in zip(found.bays, plain.bays, strict=True):
+            if bay.filled.bay.wall == "west":
+                assert ("stands against the wall" in bay.unknown) is is_against
+                assert is_against or bay.impulse_pa_s < 1.1 * other.impulse_pa_s
+
+
 def test_many_places_have_the_factors_of_each_place() -> None:
     site = walled_yard()
     facade = build_site(site, ())

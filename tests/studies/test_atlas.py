@@ -151,7 +151,7 @@ def test_new_designs_are_run_and_judged(tmp_path: Path) -> None:
         app, ["check", "--family", "shadow", "--first", "3", "--out", str(tmp_path)]
     )
     assert done.exit_code == 0, done.output
-    assert "the walls of a block out of sight | 1 |" in done.output
+    assert "the walls of a block out of sight | 4 |" in done.output
 
 
 def test_a_house_behind_the_shadow_takes_the_shadow_away_and_is_named() -> None:

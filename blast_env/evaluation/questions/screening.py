@@ -378,7 +378,8 @@ class _Facade:
         bays: The bays.
         middles_m: Their middles, before the modules of oblique walls (bays, 3).
         outward: Their outward normals (bays, 3).
-        ends_m: Distances of the middles from both ends of the wall (bays, 2).
+        ends_m: Distances of the middles from the ends of the wall on the right and on the left
+            (bays, 2).
         site: The site with a charge that does not count.
     """
 
@@ -399,7 +400,7 @@ class _Facade:
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
         free = ~_covered(site, before_m)
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
-        return cls(kept, before_m[free], normals[free], _ends_m(bays)[free], site)
+        return cls(kept, before_m[free], normals[free], _ends_m(bays, normals)[free], site)
 
     @property
     def walls(self) -> Walls:
@@ -453,8 +454,11 @@ class _Facade:
         return in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
 
 
-def _ends_m(bays: Sequence[FacadeBay]) -> FloatArray:
-    """Return the distances of the middles of bays from both ends of their wall (bays, 2)."""
+def _ends_m(bays: Sequence[FacadeBay], outward: FloatArray) -> FloatArray:
+    """Return the distances of the middles of bays from the ends of their wall (bays, 2).
+
+    First that on the right, then that on the left, seen from outside.
+    """
     walls = [(own.bay.structure, own.bay.wall, own.bay.line_number) for own in bays]
     spans = np.array([(own.bay.left_m, own.bay.right_m) for own in bays])
     _, wall = np.unique([repr(key) for key in walls], return_inverse=True)
@@ -462,7 +466,11 @@ def _ends_m(bays: Sequence[FacadeBay]) -> FloatArray:
     np.minimum.at(low, wall, spans[:, 0])
     np.maximum.at(high, wall, spans[:, 1])
     middle = spans.mean(axis=1)
-    return np.column_stack([middle - low[wall], high[wall] - middle])
+    to_low, to_high = middle - low[wall], high[wall] - middle
+    # A wall of a polygon goes on to the right, one of a rectangle to the east or to the north.
+    is_line = np.array([own.bay.line is not None for own in bays])
+    onwards = is_line | (outward[:, 1] - outward[:, 0] < 0.0)
+    return np.column_stack([np.where(onwards, to_high, to_low), np.where(onwards, to_low, to_high)])
 
 
 def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
