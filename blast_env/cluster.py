@@ -1,9 +1,9 @@
 """Work on other machines: a joblib backend for a Dask cluster.
 
-It replaces joblib's Dask backend, which waits for ever for work whose worker was killed too often
-or whose scheduler has gone, and submits no more work than the workers present at the start can do.
-Sections of scenario files, and whole scenarios, are sent once: a blast travels as its layout and
-threat, and a worker keeps what it has derived from the site.
+joblib's own Dask backend waits for ever for work whose worker was killed too often or whose
+scheduler has gone, and joblib asks a backend for results a hundred times a second. So the runner
+takes them from here as they arrive. Sections of scenario files, and whole scenarios, are sent once:
+a blast travels as its layout and threat, and a worker keeps what it has derived from the site.
 """
 
 import asyncio
@@ -15,17 +15,20 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from io import BytesIO
+from itertools import groupby
+from math import inf
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Thread
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from uuid import uuid4
 
 import joblib
 from cloudpickle import CloudPickler
-from joblib.parallel import ParallelBackendBase, SequentialBackend
+from joblib.parallel import ParallelBackendBase
 
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, import_extra, value_text
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 _CONNECT_S: Final = 10.0
 _UNDER_WAY: Final = 500
 """Least number of submitted pieces of work, so that workers that join later find some."""
+_SIZE_KEPT_S: Final = 5.0
+"""Time for which the number of threads is not asked for again."""
 _MOST_SENT: Final = 256
 """Most sections that stay on the cluster for further work."""
 _OWN: Final = ("blast_env", "blast_agents")
@@ -170,22 +175,21 @@ async def _knock(address: str) -> None:
     await comm.close()
 
 
-class _Done(NamedTuple):
-    """A finished piece of work, and the callback for its outcome."""
-
-    future: "Future"
-    tell: Callable[["_Outcome"], None]
-
-
-class _Outcome(NamedTuple):
+class Outcome(NamedTuple):
     """The result of a piece of work, or its error."""
 
     result: Any = None
     error: BaseException | None = None
 
+    def get(self) -> Any:
+        """Return the result, or raise the error."""
+        if self.error is not None:
+            raise _known(self.error)
+        return self.result
+
 
 class ClusterBackend(ParallelBackendBase):
-    """Submits each piece of work separately; fetches all finished results together.
+    """Submits pieces of work, many in one message; fetches all finished results together.
 
     Args:
         client: A client connected to the scheduler.
@@ -195,39 +199,66 @@ class ClusterBackend(ParallelBackendBase):
         section_bytes: Bytes of each section sent.
     """
 
-    supports_retrieve_callback = True
     default_n_jobs = -1
 
     def __init__(self, client: "Client") -> None:
         super().__init__(nesting_level=0)
         self._client = client
-        self._done: SimpleQueue[_Done | None] = SimpleQueue()
-        self._under_way: set[Future] = set()
         self._sent: OrderedDict[int, _Sent] = OrderedDict()
+        self._counted_s, self._count = -inf, 0
         self.work_bytes = 0
         self.section_bytes: list[int] = []
 
     def effective_n_jobs(self, n_jobs: int | None) -> int:  # noqa: ARG002
         """Return the number of pieces of work to keep submitted; `n_jobs` does not change it."""
-        return max(2 * _size(self._client).threads, _UNDER_WAY)
+        if monotonic() > self._counted_s + _SIZE_KEPT_S:
+            self._count = max(2 * _size(self._client).threads, _UNDER_WAY)
+            self._counted_s = monotonic()
+        return self._count
 
-    def start_call(self) -> None:
-        """Start a thread that fetches results until `stop_call`."""
-        self._done = SimpleQueue()
-        Thread(target=self._fetch, args=(self._done,), daemon=True).start()
+    def outcomes(
+        self, function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> Iterator[tuple[int, Outcome]]:
+        """Yield (index, outcome) of each item as soon as it is finished.
 
-    def stop_call(self) -> None:
-        """Stop fetching results."""
-        self._done.put(None)
+        What has not begun when the iteration ends is withdrawn.
 
-    def submit(self, func: Callable[[], Any], callback: Callable[[_Outcome], None]) -> "Future":
-        """Submit a piece of work; `callback` is called with its outcome."""
-        packed, common = self._packed(func)
-        future = self._client.submit(_do, packed, _origin(), *common, pure=False)
-        self._under_way.add(future)
-        done = self._done
-        future.add_done_callback(lambda future: done.put(_Done(future, callback)))
-        return future
+        Args:
+            function: Does one item.
+            items: The items.
+        """
+        done: SimpleQueue[tuple[int, Future]] = SimpleQueue()
+        under_way: dict[int, Future] = {}
+        submitted = 0
+        try:
+            while submitted < len(items) or under_way:
+                room = self.effective_n_jobs(None) - len(under_way)
+                some = items[submitted : submitted + room]
+                for index, future in enumerate(self._submitted(function, some), submitted):
+                    under_way[index] = future
+                    future.add_done_callback(partial(_note, done, index))
+                submitted += len(some)
+                # Waits for one, then takes all that are there: one message fetches many results.
+                taken = [done.get()]
+                while not done.empty():
+                    taken.append(done.get())
+                found = self._fetched([under_way.pop(index) for index, _ in taken])
+                yield from zip([index for index, _ in taken], found, strict=True)
+        finally:
+            if under_way:
+                self._client.cancel(list(under_way.values()))
+
+    def _submitted(
+        self, function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> "Iterator[Future]":
+        """Submit items in their order; those in a row with the same sections in one message."""
+        packed = [self._packed(partial(function, item)) for item in items]
+        for _, group in groupby(packed, key=lambda pair: [future.key for future in pair[1]]):
+            own = list(group)
+            work, common = [piece for piece, _ in own], own[0][1]
+            # Of keys of one group the scheduler hands out one at a time, as workers get free.
+            keys = [f"{_do.__name__}-{uuid4()}" for _ in own]
+            yield from self._client.map(_do, work, key=keys, origin=_origin(), common=common)
 
     def _packed(self, work: Callable[[], Any]) -> "tuple[bytes, list[Future]]":
         """Return a piece of work as bytes without its sections, and those, which are sent once."""
@@ -254,50 +285,24 @@ class ClusterBackend(ParallelBackendBase):
         common.setdefault(key, sent.content)
         return list(common).index(key)
 
-    def retrieve_result_callback(self, outcome: _Outcome) -> Any:
-        """Return the result of a piece of work, or raise its error."""
-        if outcome.error is not None:
-            raise _known(outcome.error)
-        return outcome.result
-
-    def abort_everything(self, ensure_ready: bool = True) -> None:  # noqa: ARG002
-        """Cancel all work that has not begun; workers finish their present piece."""
-        under_way, self._under_way = self._under_way, set()
-        self._client.cancel(list(under_way))
-
-    def get_nested_backend(self) -> tuple[ParallelBackendBase, None]:
-        """Return a sequential backend: a piece of work does not distribute its parts."""
-        return SequentialBackend(nesting_level=1), None
-
-    def _fetch(self, queue: "SimpleQueue[_Done | None]") -> None:
-        """Fetch results, all that are ready at a time, until `stop_call` ends the queue."""
-        is_over = False
-        while not is_over:
-            # Waits for one, then takes all that are there: one message fetches many results.
-            taken = [queue.get()]
-            while not queue.empty():
-                taken.append(queue.get())
-            done = [index for index in taken if index is not None]
-            is_over = len(done) < len(taken)
-            for (future, tell), outcome in zip(done, self._outcomes(done), strict=True):
-                self._under_way.discard(future)
-                tell(outcome)
-
-    def _outcomes(self, done: Sequence[_Done]) -> list[_Outcome]:
-        futures = [future for future, _ in done]
+    def _fetched(self, futures: "Sequence[Future]") -> list[Outcome]:
         if all(future.status == "finished" for future in futures):
             try:
-                return [_Outcome(result) for result in self._client.gather(futures)]
+                return [Outcome(result) for result in self._client.gather(list(futures))]
             except Exception:  # one was lost meanwhile; each is fetched separately below
                 pass
         return [_outcome(future) for future in futures]
 
 
-def _outcome(future: "Future") -> _Outcome:
+def _note(done: "SimpleQueue[tuple[int, Future]]", index: int, future: "Future") -> None:
+    done.put((index, future))
+
+
+def _outcome(future: "Future") -> Outcome:
     try:
-        return _Outcome(future.result())
+        return Outcome(future.result())
     except Exception as error:
-        return _Outcome(error=error)
+        return Outcome(error=error)
 
 
 def _known(error: BaseException) -> BaseException:
@@ -362,7 +367,7 @@ class _Unpacker(pickle.Unpickler):
         return self._common[pid]
 
 
-def _do(packed: bytes, origin: str, *common: Section) -> Any:
+def _do(packed: bytes, origin: str, common: Sequence[Section]) -> Any:
     """Do a piece of work, on a worker with the code and versions of the submitting process."""
     _check(origin)
     return _Unpacker(packed, common).load()()

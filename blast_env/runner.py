@@ -4,11 +4,13 @@ import os
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import closing
 from functools import partial
 from typing import Any, Literal, TypeVar, overload
 from warnings import catch_warnings, simplefilter
 
 import joblib
+from joblib.parallel import get_active_backend
 
 from blast_env.errors import BlastEnvError
 
@@ -131,6 +133,11 @@ def _parallel(
     workers: int,
     return_as: Literal["generator", "generator_unordered"],
 ) -> Iterator[Any]:
+    backend: Any = get_active_backend()[0]
+    if hasattr(backend, "outcomes"):  # of a cluster
+        outcomes = backend.outcomes(function, items)
+        yield from _in_order(outcomes, in_order=return_as == "generator")
+        return
     from blast_env.processes import uninterrupted  # only where processes are started
 
     parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
@@ -152,3 +159,18 @@ def _parallel(
             "a worker process has ended, for lack of memory or because it was killed; results so "
             "far are kept if the command has a folder for them, and the same command resumes"
         ) from error
+
+
+def _in_order(outcomes: Iterator[tuple[int, Any]], *, in_order: bool) -> Iterator[Any]:
+    """Yield the results of outcomes, by index where asked for; the first error ends them."""
+    with closing(outcomes):  # type: ignore[type-var]  # a generator
+        kept: dict[int, Any] = {}
+        due = 0
+        for index, outcome in outcomes:
+            if not in_order:
+                yield outcome.get()
+                continue
+            kept[index] = outcome
+            while due in kept:
+                yield kept.pop(due).get()
+                due += 1

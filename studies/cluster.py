@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter, process_time
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import joblib
 import typer
@@ -16,7 +16,7 @@ import typer
 from blast_env.answers.terminal import print_line, print_table
 from blast_env.cli.output import user_errors
 from blast_env.cluster import ClusterBackend, on_cluster
-from blast_env.design.search.registry import find_proposer
+from blast_env.design.search.registry import find_proposer, widened
 from blast_env.errors import import_extra
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase
 from blast_env.evaluation.cases import search_set
@@ -27,12 +27,16 @@ from blast_env.geometry import Element
 from blast_env.layout import draw_charge
 from blast_env.runner import run_all
 from blast_env.site import AnyScenario, find_scenario
+from blast_env.surrogate import SurrogateEngine
 from blast_env.units import MS_PER_S
 from studies.bench import hardware
 
 METHODS: Final = ("genetic", "population_annealing")
 WORKERS: Final = (2, 4, 8, 16, 32)
 """Numbers of workers of the ideal shares."""
+
+GUESSES: Final = SurrogateEngine()
+"""The engine by which the widths are counted."""
 
 _PIECES: Final = 400
 
@@ -62,11 +66,18 @@ class SearchCost:
         layout: The best layout.
         widths: Number of new blasts of each batch.
         elapsed_s: Its duration.
+        cpu_s: Processor time of this process.
     """
 
     layout: tuple[Element, ...]
     widths: tuple[int, ...]
     elapsed_s: float
+    cpu_s: float
+
+    @property
+    def cpu_of_blast_s(self) -> float:
+        """Processor time of this process per blast."""
+        return self.cpu_s / sum(self.widths)
 
     def share(self, workers: int) -> float:
         """Return the share of the ideal that the widths allow, if all blasts take equal time."""
@@ -95,22 +106,34 @@ class _Widths(BlastEvaluator):
         return loads
 
 
-def search_cost(scenario: AnyScenario, engine: Engine, method: str, budget: int) -> SearchCost:
-    """Run a search against one known charge, where the runner does its work."""
+def search_cost(
+    scenario: AnyScenario, engine: Engine, method: str, budget: int, width: int
+) -> SearchCost:
+    """Run a search of a width against one known charge, where the runner does its work."""
     site = find_scenario(scenario)
     evaluator = _Widths(site, engine)
     problem = DesignProblem(evaluator, search_set(site, draw_charge(site, 0)))
-    began = perf_counter()
-    found = find_proposer(method).propose(problem, budget)
-    return SearchCost(found.layout, tuple(evaluator.found), perf_counter() - began)
+    began, began_cpu = perf_counter(), process_time()
+    found = widened(find_proposer(method), width).propose(problem, budget)
+    spent_s = perf_counter() - began, process_time() - began_cpu
+    return SearchCost(found.layout, tuple(evaluator.found), *spent_s)
+
+
+_QUIET: Final = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "200ms",
+}
+"""What docs/howto/cluster.md sets: else an idle worker takes 3 % of a core, with it 1 %."""
 
 
 @contextmanager
 def local_cluster(workers: int) -> Iterator[str]:
     """Start a scheduler and workers with one thread each; give the scheduler's address."""
     with import_extra("cluster", "a cluster"):
+        import dask
         from distributed import LocalCluster
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
+    options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
+    with dask.config.set(_QUIET), LocalCluster(n_workers=workers, **options) as cluster:
         yield cluster.scheduler_address
 
 
@@ -157,28 +180,38 @@ def main(
     with user_errors(), local_cluster(workers) as address:
         print_line(hardware())
         _print_overhead(overhead(scenario, address))
-        rows, chosen = [], find_engine(engine)
-        for method in METHODS:
-            alone = search_cost(scenario, chosen, method, budget)
-            with on_cluster(address):
-                shared = search_cost(scenario, chosen, method, budget)
-            reached = alone.elapsed_s / (workers * shared.elapsed_s)
-            rows.append(
-                (
-                    *(method, str(len(alone.widths)), str(max(alone.widths))),
-                    *(f"{item.elapsed_s:.1f}" for item in (alone, shared)),
-                    f"{reached:.2f}",
-                    *(f"{alone.share(number):.2f}" for number in WORKERS),
-                    "yes" if shared.layout == alone.layout else "NO",
-                )
-            )
+        chosen = find_engine(engine)
+        rows = [_measured(address, scenario, chosen, method, budget, workers) for method in METHODS]
         headers = (
             *("method", "batches", "widest", "alone (s)", f"{workers} workers (s)", "share"),
-            *(f"of {number}" for number in WORKERS),
-            "same result",
+            *("CPU alone (ms a blast)", "CPU here (ms a blast)", "same result"),
         )
-        title = f"{budget} blasts on {scenario}; shares of the ideal: measured, and by the widths"
+        title = f"{budget} blasts on {scenario}: shares of the ideal, and processor times"
         print_table(title, headers, rows, 1)
+        rows = []
+        for method in METHODS:
+            found = [search_cost(scenario, GUESSES, method, budget, number) for number in WORKERS]
+            shares = (item.share(number) for item, number in zip(found, WORKERS, strict=True))
+            rows.append((method, *(f"{share:.2f}" for share in shares)))
+        title = "shares of the ideal that the widths allow"
+        print_table(title, ("method", *(f"{number} workers" for number in WORKERS)), rows, 1)
+
+
+def _measured(
+    address: str, scenario: str, engine: Engine, method: str, budget: int, workers: int
+) -> tuple[str, ...]:
+    """Return the row of a method: alone, and on a cluster of some workers."""
+    alone = search_cost(scenario, engine, method, budget, workers)
+    with on_cluster(address):
+        shared = search_cost(scenario, engine, method, budget, workers)
+    reached = alone.elapsed_s / (workers * shared.elapsed_s)
+    return (
+        *(method, str(len(alone.widths)), str(max(alone.widths))),
+        *(f"{item.elapsed_s:.1f}" for item in (alone, shared)),
+        f"{reached:.2f}",
+        *(f"{MS_PER_S * item.cpu_of_blast_s:.1f}" for item in (alone, shared)),
+        "yes" if shared.layout == alone.layout else "NO",
+    )
 
 
 if __name__ == "__main__":

@@ -218,9 +218,8 @@ def test_work_that_kills_its_workers_is_given_up() -> None:
     """Not tried for ever, and said."""
     last = SimpleNamespace(address="tcp://node7:40123")
     error = distributed.KilledWorker("blast", last, 3)
-    backend = cluster.ClusterBackend(client=None)
     with pytest.raises(BlastEnvError, match=r"ended 4 workers, .* the last one was tcp://node7"):
-        backend.retrieve_result_callback(cluster._Outcome(error=error))
+        cluster.Outcome(error=error).get()
 
 
 def test_a_lost_scheduler_is_an_error(

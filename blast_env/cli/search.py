@@ -149,8 +149,8 @@ _VerifyOption = Annotated[
 _WidthOption = Annotated[
     int | None,
     typer.Option(
-        help="Blasts that run at the same time, for the walkers of population_annealing. The "
-        "layout depends on it.",
+        help="Blasts that run at the same time, for the walkers of population_annealing and the "
+        "children of genetic and nsga2. The layout depends on it.",
         show_default="the threads of the cluster, else 1",
         min=1,
     ),

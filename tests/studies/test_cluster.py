@@ -2,9 +2,7 @@
 
 import pytest
 
-from blast_env.evaluation.engines import find_engine
-from blast_env.surrogate import SurrogateEngine
-from studies.cluster import SearchCost, search_cost
+from studies.cluster import GUESSES, METHODS, SearchCost, search_cost
 
 
 @pytest.mark.parametrize(
@@ -14,11 +12,14 @@ from studies.cluster import SearchCost, search_cost
 def test_workers_wait_for_the_last_round_of_each_batch(
     widths: tuple[int, ...], workers: int, share: float
 ) -> None:
-    assert SearchCost((), widths, 0.0).share(workers) == pytest.approx(share)
+    assert SearchCost((), widths, 0.0, 0.0).share(workers) == pytest.approx(share)
 
 
-def test_widths_add_up_to_the_blasts_of_the_search() -> None:
-    found = search_cost("control_room", find_engine(SurrogateEngine()), "genetic", 30)
-    assert sum(found.widths) == 30
-    assert len(found.widths) > 2
-    assert found.layout
+@pytest.mark.parametrize("method", METHODS)
+def test_a_width_keeps_workers_at_work(method: str) -> None:
+    """Widths add up to the blasts of the search, and a wider search leaves few workers idle."""
+    found = {width: search_cost("control_room", GUESSES, method, 100, width) for width in (1, 4)}
+    assert [sum(item.widths) for item in found.values()] == [100, 100]
+    assert found[1].share(4) <= found[4].share(4)
+    assert found[4].share(4) > 0.85
+    assert found[1].layout

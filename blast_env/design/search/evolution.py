@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.design.search.by_rule import rule_layouts
 from blast_env.design.search.moves import Draw, Moves, random_part, random_walls
-from blast_env.design.search.session import Search, SearchSession
+from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.geometry import Layout
 
 _LEAST_POPULATION: Final = 6
@@ -23,13 +23,31 @@ def population_size(layouts: int) -> int:
     return int(np.clip(round(0.7 * layouts**0.5), _LEAST_POPULATION, _MOST_POPULATION))
 
 
+_LEAST_GENERATIONS: Final = 8
+
+
+def generation_size(population: int, plan: Plan, width: int) -> int:
+    """Return the number of children of a generation: half of the population, or more.
+
+    It is rounded up to as many as keep `width` blasts at work at the same time, as far as the
+    budget pays for eight such generations.
+
+    Args:
+        population: Number of parents.
+        plan: The division of the blasts.
+        width: Number of blasts that can run at the same time.
+    """
+    at_once = min(-(-width // plan.threats), plan.exploring_layouts // _LEAST_GENERATIONS)
+    return -(-max(2, population // 2) // max(at_once, 1)) * max(at_once, 1)
+
+
 @dataclass(frozen=True)
 class GeneticSearch(Search):
     """pymoo's `GA` with sampling, crossover, mutation and repair for layouts.
 
     The best initial layouts form the first population; then the best of parents and children
     survive. The population grows with the square root of the layouts that the budget pays for,
-    and a generation has half as many children.
+    and a generation has half as many children, or more with a width.
 
     Attributes:
         initial: Initial layouts, in addition to those of the rules and random ones.
@@ -38,6 +56,7 @@ class GeneticSearch(Search):
         starting_share: Share of the exploration spent on random initial layouts.
         crossed_share: Share of the pairs of parents that are crossed; all children are mutated.
         more_moves: Probability of each further move of a child after the first.
+        width: See `generation_size`; the population has as many layouts at least.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -46,6 +65,7 @@ class GeneticSearch(Search):
     starting_share: float = 0.25
     crossed_share: float = 0.5
     more_moves: float = 0.5
+    width: int = 1
     name: str = "genetic"
 
     def explore(self, session: SearchSession) -> None:
@@ -59,6 +79,8 @@ class GeneticSearch(Search):
 
         scenario, plan = session.problem.scenario, session.plan
         size = population_size(plan.exploring_layouts)
+        children = generation_size(size, plan, self.width)
+        size = max(size, children)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             return session.assess(layouts)[:, np.newaxis]
@@ -72,7 +94,7 @@ class GeneticSearch(Search):
         session.assess([*self.initial, *of_rules, *drawn])
         first = session.ranked(plan.threats)[:size]
         made = operators(Moves(scenario), first, self.crossed_share, self.more_moves)
-        algorithm = GA(pop_size=size, n_offsprings=max(2, size // 2), **made)
+        algorithm = GA(pop_size=size, n_offsprings=children, **made)
         evolve(session, algorithm, objectives)
 
 
@@ -93,6 +115,7 @@ class Nsga2Search(Search):
         crossed_share: Share of the pairs of parents that are crossed; all children are mutated.
         more_moves: Probability of each further move of a child after the first.
         count_share: Share of the moves that add or remove a module or piece.
+        width: As for `GeneticSearch`.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -100,6 +123,7 @@ class Nsga2Search(Search):
     crossed_share: float = 0.5
     more_moves: float = 0.5
     count_share: float = 0.4
+    width: int = 1
     name: str = "nsga2"
 
     has_front: ClassVar[bool] = True
@@ -115,6 +139,8 @@ class Nsga2Search(Search):
 
         problem = session.problem
         size = 2 * population_size(session.plan.exploring_layouts)
+        children = generation_size(size, session.plan, self.width)
+        size = max(size, children)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             # Load and price conflict: NSGA-II (Deb and others 2002) keeps the non-dominated layouts
@@ -126,7 +152,7 @@ class Nsga2Search(Search):
         moves = Moves(problem.scenario, count_share=self.count_share)
         first = [*self.initial, *drawn]
         made = operators(moves, first, self.crossed_share, self.more_moves)
-        algorithm = NSGA2(pop_size=size, n_offsprings=max(2, size // 2), **made)
+        algorithm = NSGA2(pop_size=size, n_offsprings=children, **made)
         evolve(session, algorithm, objectives)
 
     def choose(self, session: SearchSession) -> None:

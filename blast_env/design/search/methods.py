@@ -84,8 +84,8 @@ class PopulationAnnealingSearch(Search):
         exchanged_share: Share of the walkers that restart from the best ones at an exchange.
         hot: Initial temperature, relative to the load of the best initial walker.
         cold: Final temperature, relative to the same load.
-        width: Number of blasts that can run at the same time: there are at least as many walkers
-            as they keep at work, as far as each makes eight moves.
+        width: Number of blasts that can run at the same time: the number of walkers is rounded up
+            to as many as they keep at work, as far as each makes eight moves.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -107,7 +107,7 @@ class PopulationAnnealingSearch(Search):
         walkers = round(0.4 * plan.exploring_layouts**0.5)
         walkers = int(np.clip(walkers, _LEAST_WALKERS, _MOST_WALKERS))
         wide = min(-(-self.width // plan.threats), plan.exploring_layouts // _LEAST_MOVES)
-        walkers = max(walkers, wide)
+        walkers = -(-walkers // max(wide, 1)) * max(wide, 1)
         count = max(walkers, round(self.starting_share * plan.exploring_layouts))
         initial = [*self.initial, *(rule_layouts(session.problem) if self.from_rules else ())]
         count = max(count - len(initial), 0)
