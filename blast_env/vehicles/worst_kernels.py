@@ -135,7 +135,7 @@ def worst_against(
             more[box, side] = round(more_m[box, side] * per_m) + (half if side > 1 else -half)
     x, lattice_x = with_edges(cuts_x, more, 0), with_edges(places_x, more, 0)
     y, lattice_y = with_edges(cuts_y, more, 1), with_edges(places_y, more, 1)
-    closed, solid = np.concatenate((always, more[:count])), np.concatenate((never, more[count:]))
+    closed, solid = _joined(always, more, 0, count), _joined(never, more, count, len(more))
     _, reached, clear = reached_parts(x, y, closed, solid, starts)
     # 1. The squares of the distances of all places from the nearest wall, row by row.
     x_m, y_m = lattice_x / per_m, lattice_y / per_m
@@ -189,7 +189,8 @@ def put_stand_offs(
         after = stops = 0
         is_plain = True
         for kind in (STOPS, SOLID):
-            for number in layouts[layout, : counts[layout]]:
+            for place in range(counts[layout]):
+                number = layouts[layout, place]
                 is_plain = is_plain and kinds[number] != OTHER
                 if kinds[number] == kind:
                     for side in range(4):
@@ -254,7 +255,7 @@ def _nearest_m2(
                 nearest[column] = inf
         for column in range(columns):
             lowest[column] = min(lowest[column], nearest[column])
-    return found, lowest.min()
+    return found, _least_of(lowest)
 
 
 @njit(error_model="numpy")
@@ -275,7 +276,26 @@ def _least_apart(
                     nearest[column] = inf
         for column in range(len(x_m)):
             lowest[column] = min(lowest[column], nearest[column])
-    return float(lowest.min())
+    return _least_of(lowest)
+
+
+@njit(error_model="numpy")
+def _joined(boxes: IntArray, more: IntArray, first: int, after: int) -> IntArray:
+    """Return boxes and some of others; slices would compile NumPy's messages too."""
+    found = np.empty((len(boxes) + after - first, 4), dtype=np.int64)
+    for box in range(len(found)):
+        for side in range(4):
+            own = boxes[box, side] if box < len(boxes) else more[first + box - len(boxes), side]
+            found[box, side] = own
+    return found
+
+
+@njit(error_model="numpy")
+def _least_of(values: FloatArray) -> float:
+    least = inf
+    for number in range(len(values)):
+        least = min(least, values[number])
+    return least
 
 
 @njit(error_model="numpy")
