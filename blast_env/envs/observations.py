@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.envs.observable import (
+    FULL_STOCK,
     Array,
     BatchObservation,
     Observable,
@@ -170,9 +171,7 @@ class FeaturesEpisode(BatchObservation):
         """Return the vectors of several episodes (episodes, features)."""
         from blast_env.envs.observation_kernels import put_vectors  # Numba takes long to import
 
-        shares, has_items = stock_shares(placements), placements.rules[0].catalogue.has_items
-        if has_items:
-            shares = np.concatenate((shares, items_left(placements)), axis=1)
+        has_items = placements.rules[0].catalogue.has_items
         distinct = {id(episode): episode for episode in episodes}
         position = {key: number for number, key in enumerate(distinct)}
         own = np.array([position[id(episode)] for episode in episodes])
@@ -181,13 +180,16 @@ class FeaturesEpisode(BatchObservation):
         _, kinds, rows, columns = placements.legal.shape
         legal = placements.legal.view(np.uint8).reshape(-1, kinds, rows * columns)
         occupancy = placements.occupancy.reshape(-1, rows * columns)
-        length = shares.shape[1] + constants.shape[1] + 2 * rows * columns
+        length = _SHARES + constants.shape[1] + 2 * rows * columns
         if has_items:
-            length += (2 + kinds) * rows * columns
+            length += placements.left.shape[1] - 1 + (2 + kinds) * rows * columns
         shows_vehicles = episodes[0].observable.shows_vehicles
         vectors = placements.room((len(episodes), length + shows_vehicles))
-        of_episodes = own, constants, variants, shares, legal, occupancy, has_items
-        put_vectors(*of_episodes, _SHARES, _SITE, vectors)
+        put_vectors(
+            *(own, constants, variants, placements.left, placements.stock),
+            *(placements.budget_left, placements.budget, legal, occupancy, has_items),
+            *(FULL_STOCK, _SITE, vectors),
+        )
         if shows_vehicles:
             stand_offs = _stand_offs([episode.observable for episode in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)

@@ -26,7 +26,7 @@ from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.layers import SingleArray, two_layers
-from blast_env.surrogate.pieces import NetworkLayers, PieceKnowledge, Scales
+from blast_env.surrogate.pieces import NetworkLayers, PieceKnowledge, Scales, mean_and_spread
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.rooms import Room
 from blast_env.surrogate.walls import SurrogateSite
@@ -315,7 +315,7 @@ class Surrogate:
         places = [self._put_logs(*one, found) for one in asked]
         # ln load by each network; the prediction and its spread over the networks, which were
         # fitted from different beginnings (deep ensembles, Lakshminarayanan et al. 2017).
-        both = [_mean_and_spread(np.concatenate(logs, axis=1)) if logs else () for logs in found]
+        both = [mean_and_spread(np.concatenate(logs, axis=1)) if logs else () for logs in found]
         guesses, firsts = [], [0, 0]
         for (site, layouts, _), place in zip(asked, places, strict=True):
             own: list[FloatArray] = []
@@ -441,11 +441,6 @@ def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatAr
     """
     found: FloatArray = np.clip((numbers - mean) / scale, -_MOST_SPREADS, _MOST_SPREADS)
     return found
-
-
-def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,)."""
-    return np.exp(agreed(logs)), logs.std(axis=0)
 
 
 def agreed(logs: FloatArray) -> FloatArray:

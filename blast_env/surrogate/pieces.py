@@ -11,7 +11,7 @@ second time on, that of pieces from the third; before, it is in room that the ne
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from math import exp, log
+from math import exp, log, sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -479,6 +479,43 @@ def _put_loads(
             for structure in range(len(starts)):
                 of_structure = log(loads[structure] / areas_m2[structure]) / power
                 found[member, layout, structure] = of_structure
+
+
+def mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,).
+
+    Args:
+        logs: Logarithms of loads by each network (members, n); see `network.agreed`.
+    """
+    mean, spread = np.empty((2, logs.shape[1]))
+    _put_mean_and_spread(logs, np.empty(len(logs)), mean, spread)
+    return mean, spread
+
+
+@compiled(nogil=True, error_model="numpy")
+def _put_mean_and_spread(logs: Any, own: Any, mean: Any, spread: Any) -> None:
+    members, loads = logs.shape
+    cut = 1 if members > 2 else 0
+    for number in range(loads):
+        # 1. In rising order, by insertion; 2. the mean without the highest and the lowest.
+        total = 0.0
+        for member in range(members):
+            value, at = logs[member, number], member
+            total += value
+            while at and own[at - 1] > value:
+                own[at] = own[at - 1]
+                at -= 1
+            own[at] = value
+        middle = 0.0
+        for member in range(cut, members - cut):
+            middle += own[member]
+        mean[number] = exp(middle / (members - 2 * cut))
+        # 3. The standard deviation of all.
+        total /= members
+        squares = 0.0
+        for member in range(members):
+            squares += (own[member] - total) ** 2
+        spread[number] = sqrt(squares / members)
 
 
 class Memory:
