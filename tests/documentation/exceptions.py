@@ -259,7 +259,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.bench --repeats 3": (
         "--engine event --repeats 1 --no-memory --no-environment"
     ),
-    "python -m studies.bench --engine surrogate --scenario control_room": (
+    "python -m studies.bench --engine surrogate --scenario control_room --repeats 25": (
         "--repeats 1 --no-memory --environments 2"
     ),
     "blast-env calibrate --name ballistic_kb_100kg --reference reflected_impulse"
