@@ -233,6 +233,9 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "blast-env judge --scenario headroom_sites --cases 4 --budget 0 --budget 10 --cell 0.5"
     " --method rules --method agent --method surrogate --out out/entry": "--cases 1 --budget 0",
+    "blast-env judge --scenario item_sites --scenario kerb_sites --cases 3 --budget 0 --cell 0.5"
+    " --method rules --method studies.benchmark.methods:imitation --method"
+    " studies.benchmark.methods:ppo --out out/entry": "--cases 1",
     "blast-env judge entry/genetic.json --cache blasts --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers
