@@ -5,6 +5,7 @@ from typing import Final
 
 from blast_env.answers.document import AnyPart, Line, Table
 from blast_env.evaluation.questions.screening import (
+    BEHIND_LOW_BY,
     LOW_BY,
     RAISED_SCALED_M,
     BayScreening,
@@ -67,6 +68,7 @@ def screening_answer(
     for threat in found.threats:
         yield from map(Line.of, _unknown_words(threat))
         yield from map(Line.of, _edge_words(threat))
+        yield from map(Line.of, _behind_words(threat))
     for threat in found.threats:
         title = (
             f"stand-off in the open (m) from which a component allows a level, {threat.name},"
@@ -128,6 +130,17 @@ def _edge_words(threat: ThreatScreening) -> Iterator[str]:
             f"{threat.name}: impulses of {count_of('bay', len(changed))} are x {min(changed):.2f}"
             f" to {max(changed):.2f} of the curves' for the edges of walls and the angle of the"
             " wave"
+        )
+
+
+def _behind_words(threat: ThreatScreening) -> Iterator[str]:
+    """Yield that the loads behind rows may be low."""
+    count = sum("behind" in bay.around for bay in threat.bays)
+    if count:
+        yield (
+            f"{threat.name}: {count_of('bay', count)} behind pieces or buildings: on sites that no"
+            f" law has met gas had up to {BEHIND_LOW_BY:g} times the impulse that counts here; a"
+            " blast by gas decides"
         )
 
 

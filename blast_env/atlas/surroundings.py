@@ -289,7 +289,7 @@ class SiteAtlas:
     def _away(self, wall: "_Wall", solid: Solid, structure: str) -> "_Around":
         """Return the shadow on a wall of a rectangular building that faces away.
 
-        The law is of buildings that stand alone: one behind throws the wave back into the shadow.
+        The law is of buildings that stand alone: another one throws the wave back into the shadow.
         """
         count = len(wall.middles)
         own = [index for index, name in enumerate(solid.structures) if name == structure]
@@ -302,9 +302,9 @@ class SiteAtlas:
         factors = self._laws.shadow.factors(numbers)
         others = solid.is_building & (np.arange(len(solid.boxes)) != own[0])
         name = "in the shadow of its building"
-        if between.lies_before(wall.middles, wall.normal, solid.boxes[others]).any():
+        if others.any():
             factors = factors._replace(in_range=np.zeros(count, dtype=bool))
-            name = f"{name}, with another behind that may add load"
+            name = f"{name}, with another on the site that may add load"
         note = _Note.of(name, factors, np.ones(count, dtype=bool))
         return _Around(alone, factors.where_known(), [note])
 

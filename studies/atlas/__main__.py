@@ -220,6 +220,21 @@ def sites(
 
 
 @app.command()
+def unseen(
+    sites: Annotated[int, typer.Option(min=1, help="Sites of each of four kinds.")] = 52,
+    out: Annotated[Path, typer.Option(help="Folder of the blasts.")] = Path("out/atlas_unseen"),
+) -> None:
+    """Compare screening without and with the atlas with gas dynamics, on unseen sites."""
+    from studies.atlas.unseen import rows as unseen_rows
+    from studies.atlas.unseen import unseen_bays
+
+    with user_errors():
+        bays = [bay for seed in range(sites) for bay in unseen_bays(seed, out)]
+        headers = ("bays", "number", "gas over 1.15 of screening, impulse", "peak")
+        print_line(markdown_table((*headers, "largest, impulse", "peak"), unseen_rows(bays)))
+
+
+@app.command()
 def thumb(
     name: Annotated[list[str] | None, typer.Argument(help="Bundled sites.")] = None,
 ) -> None:

@@ -73,8 +73,8 @@ def on_site(name: str, has_layout: bool, known: Laws, folder: Path) -> Iterator[
         layout = tuple(load_layout(_BEST / f"{site.name}.json", site))
     for number, threat in enumerate(screen(site, layout).threats):
         path = folder / f"{name}_{'layout' if has_layout else 'alone'}_{number}.json"
-        own = _under(site, threat.charge)
-        by_gas = _by_gas(own, layout, path)
+        own = under_charge(site, threat.charge)
+        by_gas = bays_by_gas(own, layout, path)
         before, after = (screen(own, layout, (), atlas).threats[0] for atlas in (None, known))
         least_m = CHECKED_SCALED_DISTANCE[0] * float(np.cbrt(threat.charge.tnt_kg))
         chosen = [
@@ -94,7 +94,7 @@ def on_site(name: str, has_layout: bool, known: Laws, folder: Path) -> Iterator[
             )
 
 
-def _by_gas(site: Scenario, layout: Layout, path: Path) -> Mapping[str, tuple[float, float]]:
+def bays_by_gas(site: Scenario, layout: Layout, path: Path) -> Mapping[str, tuple[float, float]]:
     """Return impulse and peak of each bay by gas dynamics, from a file if it exists.
 
     Cells clip peaks, more so near the charge, and a slanting wave crosses a bay in time. So a peak
@@ -139,7 +139,7 @@ def _alone(site: Scenario, structure: str) -> Scenario:
     return Scenario.from_document({**document, "structures": kept}, site.name)
 
 
-def _under(site: Scenario, charge: Charge) -> Scenario:
+def under_charge(site: Scenario, charge: Charge) -> Scenario:
     """Return a site whose charge is at one place."""
     x_m, y_m = charge.position_m
     point = {

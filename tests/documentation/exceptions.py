@@ -125,6 +125,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.atlas scaling": "--family posts",
     "python -m studies.atlas cases": "--cell 0.5",
     "python -m studies.atlas sites": "control_room",
+    "python -m studies.atlas unseen": "--sites 1",
     "python -m studies.atlas check --groups 3": "--family shadow --groups 1",
     "python -m studies.response peaks": "--cell 0.5",
     "python -m studies.response raised": "--cell 0.5 --distances 10 --heights 0,1.1",

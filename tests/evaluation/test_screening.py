@@ -265,10 +265,17 @@ def test_what_the_atlas_does_not_know_takes_nothing_off_and_says_so() -> None:
     assert any("outside the range of the atlas: behind garden_wall 10 m" in line for line in lines)
 
 
-def test_pieces_of_a_layout_shield() -> None:
+def test_pieces_of_a_layout_shield_and_loads_behind_them_may_be_low() -> None:
     site = load_scenario("control_room").with_facades("window_laminated_6", None)
     layout = tuple(load_layout(BEST, site))
-    alone, behind = (screen(site, own, (), packaged_laws()).threats[0].bays for own in ((), layout))
+    screened = [screen(site, own, (), packaged_laws()) for own in ((), layout)]
+    alone, behind = (found.threats[0].bays for found in screened)
+    parts = [list(screening_answer(site, layout, found, [LOW])) for found in screened]
+    warned = [
+        any("behind pieces or buildings" in part.text() for part in own if isinstance(part, Line))
+        for own in parts
+    ]
+    assert warned == [False, True]
     assert sum(bay.impulse_pa_s for bay in behind) < 0.9 * sum(bay.impulse_pa_s for bay in alone)
     assert any(bay.around.startswith("behind ") for bay in behind)
 

@@ -171,5 +171,5 @@ def test_a_house_behind_the_shadow_takes_the_shadow_away_and_is_named() -> None:
         assert (bay.around, bay.unknown) == ("in the shadow of its building", "")
     for bay in behind:
         assert bay.factor == (1.0, 1.0, 1.0)
-        assert bay.unknown.endswith("another behind that may add load")
+        assert bay.unknown.endswith("another on the site that may add load")
     assert np.mean([bay.impulse_pa_s for bay in behind]) > 0.7 * loads[1]
