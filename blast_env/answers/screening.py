@@ -135,12 +135,11 @@ def _edge_words(threat: ThreatScreening) -> Iterator[str]:
 
 def _behind_words(threat: ThreatScreening) -> Iterator[str]:
     """Yield that the loads behind rows may be low."""
-    count = sum("behind" in bay.around for bay in threat.bays)
-    if count:
+    if threat.behind:
         yield (
-            f"{threat.name}: {count_of('bay', count)} behind pieces or buildings: on sites that no"
-            f" law has met gas had up to {BEHIND_LOW_BY:g} times the impulse that counts here; a"
-            " blast by gas decides"
+            f"{threat.name}: {count_of('bay', threat.behind)} behind pieces or buildings: on sites"
+            f" that no law has met gas had up to {BEHIND_LOW_BY:g} times the impulse that counts"
+            " here; a blast by gas decides"
         )
 
 

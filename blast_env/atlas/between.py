@@ -47,9 +47,8 @@ _BUILDING: Final = (0.5, 2.0)
 _OVER: Final = 1.4
 """Height over the straight way, m/kg^(1/3), that higher obstacles count as: they take more off."""
 
-_CLOSE: Final = (
-    0.4  # m/kg^(1/3) before a bay: where the wave falls into the gap, and is thrown back
-)
+_CLOSE: Final = 0.4
+"""Distance from a bay, m/kg^(1/3), within which the wave falls into the gap and is thrown back."""
 
 _POWER: Final = 4
 """Of what a row takes away, for its weight among several."""

@@ -131,10 +131,13 @@ class Surroundings(PlaceFactors):
     Attributes:
         words: What each bay has, with the name of the obstacle; empty in the open.
         unknown: What each bay has outside the range of the laws; empty if nothing.
+        is_behind: Whether rows of pieces or houses change the load of each bay, or might outside
+            the range (bays,).
     """
 
     words: tuple[str, ...]
     unknown: tuple[str, ...]
+    is_behind: BoolArray
 
 
 class SiteAtlas:
@@ -161,10 +164,14 @@ class SiteAtlas:
         """
         found, notes = self._found(np.array([charge_m]) / scale, scale)
         words, unknown = [""] * len(found.faces), [""] * len(found.faces)
+        is_behind = np.zeros(len(found.faces), dtype=bool)
         for rows, note in notes:
             _add(words, rows[note.counts & note.in_range], note.name)
             _add(unknown, rows[~note.in_range], note.name)
-        return Surroundings(found.edges, found.factors, found.faces, tuple(words), tuple(unknown))
+            is_behind[rows[note.counts | ~note.in_range]] |= note.is_row
+        return Surroundings(
+            found.edges, found.factors, found.faces, tuple(words), tuple(unknown), is_behind
+        )
 
     def at(self, charges_m: FloatArray, scale: float) -> PlaceFactors:
         """Return the factors for many places of a charge, of all bays (places * bays, ...).
@@ -248,7 +255,7 @@ class SiteAtlas:
             for index, row in enumerate(rows):
                 tallest = row.members[int(free.boxes[row.members, 5].argmax())]
                 name = f"behind {free.names[tallest]}"
-                notes.append(_Note.of(name, own, every).only(most == index))
+                notes.append(replace(_Note.of(name, own, every).only(most == index), is_row=True))
         for law, name in (
             (self._laws.opposite, "a front opposite"),
             (self._laws.beside, "walls beside"),
@@ -342,6 +349,7 @@ class _Note:
     name: str
     in_range: BoolArray
     counts: BoolArray
+    is_row: bool = False
 
     @classmethod
     def of(cls, name: str, factors: Factors, counts: BoolArray) -> "_Note":

@@ -101,10 +101,9 @@ def _layout(site: Scenario, charge: AnyCharge, seed: int) -> tuple[str, Layout]:
 
 
 def _group(bay: BayScreening) -> str:
-    words = bay.around + bay.unknown
-    if "shadow" in words:
+    if not bay.faces_charge:
         return _GROUPS[0]
-    return _GROUPS[1] if "behind" in words else _GROUPS[2]
+    return _GROUPS[1] if bay.is_behind else _GROUPS[2]
 
 
 def _over(loads: tuple[float, float], bay: BayScreening) -> tuple[float, float]:

@@ -276,6 +276,8 @@ def test_pieces_of_a_layout_shield_and_loads_behind_them_may_be_low() -> None:
         for own in parts
     ]
     assert warned == [False, True]
+    doubts = ["loads may be low" in found.threats[0].doubts([LOW]) for found in screened]
+    assert doubts == warned
     assert sum(bay.impulse_pa_s for bay in behind) < 0.9 * sum(bay.impulse_pa_s for bay in alone)
     assert any(bay.around.startswith("behind ") for bay in behind)
 

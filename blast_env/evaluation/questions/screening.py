@@ -88,6 +88,8 @@ class BayScreening:
         response: Response of its windows and wall panel.
         around: What stands around it and changes its load; empty in the open.
         unknown: What stands around it outside the range of the atlas.
+        faces_charge: Whether its wall faces the charge, by the atlas.
+        is_behind: Whether rows of pieces or houses stand before it, by the atlas.
         factor: What that does to the impulse: best estimate, lower and upper end.
         edges: What the edges of its wall and the angle of the wave do to the impulse of the curves.
         likely_pa_s: The best estimate of the impulse; what counts is on the safe side of it.
@@ -102,6 +104,8 @@ class BayScreening:
     response: FacadeResponse
     around: str = ""
     unknown: str = ""
+    faces_charge: bool = True
+    is_behind: bool = False
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
     edges: float = 1.0
     likely_pa_s: float = 0.0
@@ -149,6 +153,11 @@ class ThreatScreening:
         """Whether gas may have more: the charge is above the ground, and a bay is near."""
         return self.charge.height_m > 0.0 and self.scaled_m < RAISED_SCALED_M
 
+    @property
+    def behind(self) -> int:
+        """Number of bays behind rows, whose loads may be low on sites unlike those of the atlas."""
+        return sum(bay.is_behind for bay in self.bays)
+
     def doubts(self, required: Sequence[Requirement]) -> str:
         """Return the conditions of a verdict on requirements, in brackets; empty without any."""
         found = [bay.response for bay in self.bays]
@@ -157,7 +166,8 @@ class ThreatScreening:
             for requirement in required
             if requirement.level
         )
-        doubts = ["may be breached"] * self.may_breach + ["loads may be low"] * self.may_be_low
+        doubts = ["may be breached"] * self.may_breach
+        doubts += ["loads may be low"] * (self.may_be_low or self.behind > 0)
         doubts += ["rests on assumptions"] * rests
         return f" ({', '.join(doubts)})" if doubts else ""
 
@@ -588,6 +598,8 @@ def _screened(
                 found,
                 around=own.words[index],
                 unknown=own.unknown[index],
+                faces_charge=bool(own.faces[index]),
+                is_behind=bool(own.is_behind[index]),
                 factor=(middle, low, high),
                 edges=float(own.edges.middle[index, 0]),
             )
