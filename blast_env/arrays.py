@@ -21,8 +21,6 @@ def any_in_windows(counts: NDArray[np.int32], rows: int, columns: int) -> BoolAr
 
     Args:
         counts: `counts_before` of the cells.
-        rows: Rows of a window.
-        columns: Columns of a window.
 
     Returns:
         By lower left cell (..., rows, columns); empty for windows larger than the grid.

@@ -79,7 +79,6 @@ def floors_m(rise_m: float, storey_m: float = STOREY_M, storeys: int | None = No
     The ground floor has the remaining height if the storeys do not fill the building.
 
     Args:
-        rise_m: Height of the building above its base.
         storey_m: Height of the other storeys.
         storeys: Number of storeys, which then are equally high.
     """
@@ -130,7 +129,6 @@ def divide(
     The bays of a wall have equal widths, as close as possible to `bay_m`.
 
     Args:
-        structure: Name of the structure.
         ground_m: Its outline on the ground.
         height_m: Height of its top above the ground.
         walls: The walls to divide, of west, east, south, north.

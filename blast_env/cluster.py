@@ -153,9 +153,6 @@ def address_of(scheduler: str) -> str:
 
     Args:
         scheduler: The address, or the path of its scheduler file.
-
-    Raises:
-        BlastEnvError: If a scheduler file cannot be read.
     """
     if not os.path.isfile(scheduler):
         return scheduler
@@ -225,7 +222,6 @@ class ClusterBackend(ParallelBackendBase):
 
         Args:
             function: Does one item.
-            items: The items.
         """
         done: SimpleQueue[tuple[int, Future]] = SimpleQueue()
         under_way: dict[int, Future] = {}

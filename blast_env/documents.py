@@ -68,11 +68,7 @@ def read_text(path: Path, most_bytes: int = MAX_BYTES) -> str:
     """Return the text of a UTF-8 file; a byte order mark is dropped.
 
     Args:
-        path: The file.
         most_bytes: Largest size of the file.
-
-    Raises:
-        DocumentError: If it cannot be read; the message has the reason, not the file's name.
     """
     try:
         content = read_regular(path, most_bytes)
@@ -98,11 +94,7 @@ _TOML_TOKEN: Final = re.compile(
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the content of a TOML file from its text.
-
-    Raises:
-        DocumentError: If it is not TOML, or nested too deeply.
-    """
+    """Return the content of a TOML file from its text."""
     _check_toml_depth(text)
     try:
         return tomllib.loads(text)
@@ -157,13 +149,7 @@ _JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|([\[{])|([\]}])', re.DOTAL
 
 
 def parse_json(text: str) -> Any:
-    """Return the content of a JSON file from its text.
-
-    Raises:
-        DocumentError: If it is not JSON, has too many values, is nested too deeply, has a key twice
-            in one object (one of them would be lost), an integer that is too long, or a constant
-            such as NaN.
-    """
+    """Return the content of a JSON file from its text."""
     check_values(text)
     depth = 0
     # Before the parser: it recurses, and fails without a place.
@@ -185,11 +171,7 @@ def parse_json(text: str) -> Any:
 
 
 def check_values(text: str) -> str:
-    """Return the text of a JSON file after a check of the number of its values.
-
-    Raises:
-        DocumentError: If there are more than `MOST_VALUES`.
-    """
+    """Return the text of a JSON file after a check of the number of its values."""
     values = text.count(",") + text.count("[") + text.count("{")
     if values > MOST_VALUES:
         message = f"has {values:,} commas and opening brackets, must have at most {MOST_VALUES:,}"
@@ -230,9 +212,6 @@ def checked_as(kind: type[T], content: Any) -> T:
     Args:
         kind: The type: a model, a dataclass, or any other type that pydantic knows.
         content: The parsed content of a file.
-
-    Raises:
-        DocumentError: If it is anything else; the message has key, value and bound.
     """
     # In JSON, lists may be tuples and texts may be members of an enumeration, however strict.
     text = json.dumps(content, default=_no_json)
@@ -275,10 +254,6 @@ def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
         text: The text; its last line has an end.
         kind: The type of a row, by the names of the columns; cells are texts, read as numbers
             where the type has numbers.
-
-    Raises:
-        DocumentError: If it is no table, was cut within a line, or a row is not of the type; the
-            place is the line.
     """
     if not text:
         raise DocumentError("", "is empty, must have a line with the names of columns")

@@ -27,12 +27,7 @@ def read_regular(path: str | Path, most_bytes: int) -> bytes:
     """Return the content of a regular file: no pipe, device or folder, whose reading might hang.
 
     Args:
-        path: The file.
         most_bytes: Largest size of the file, holes included.
-
-    Raises:
-        BlastEnvError: If it cannot be read, is another kind of file, or is larger; the message has
-            the reason, not the file's name.
     """
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
@@ -60,11 +55,7 @@ def read_regular(path: str | Path, most_bytes: int) -> bytes:
 
 
 def make_folder(folder: str | Path) -> None:
-    """Make a folder and its parents, unless it exists.
-
-    Raises:
-        BlastEnvError: If the path is not a folder, or it cannot be made.
-    """
+    """Make a folder and its parents, unless it exists."""
     try:
         path_of(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -82,17 +73,11 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
     of `target` removes it.
 
     Args:
-        target: The file to write.
         durable: Whether to wait until file and folder are on the device, so that a loss of power
             neither removes nor cuts the file. Costs some milliseconds.
 
     Yields:
         The path to write to.
-
-    Raises:
-        BlastEnvError: If the folder does not exist or cannot be written to, if `target` is
-            itself a folder or a device, or if the block raises `OSError`: the device is full, for
-            example.
     """
     path = Path(os.path.realpath(path_of(target)))
     if os.path.isdir(path):
@@ -125,11 +110,7 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text in UTF-8, whole or not at all; return its path.
-
-    Raises:
-        BlastEnvError: If it cannot be written there.
-    """
+    """Write a text in UTF-8, whole or not at all; return its path."""
     with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return path_of(path)
@@ -137,12 +118,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Provide a temporary folder, which is deleted when the block ends.
-
-    Raises:
-        BlastEnvError: If it cannot be made, or if the block raises `OSError`: the device is full,
-            for example.
-    """
+    """Provide a temporary folder, which is deleted when the block ends."""
     try:
         with TemporaryDirectory() as folder:
             yield Path(folder)

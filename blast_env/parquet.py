@@ -37,16 +37,10 @@ def write_table(
     at all.
 
     Args:
-        frame: The table.
-        columns: Its columns.
-        record: The run record.
         path: The file, with the suffix `.parquet`; an existing one is replaced.
 
     Returns:
         The path.
-
-    Raises:
-        BlastEnvError: If the suffix is wrong or the file cannot be written there.
     """
     path = path_of(path)
     if path.suffix.lower() != SUFFIX:
@@ -66,15 +60,10 @@ def read_parquet(
     """Read a file of `write_table`, in a separate process with limits on time and memory.
 
     Args:
-        path: The file.
         columns: Columns that it must have, among others.
 
     Returns:
         The table and the run record.
-
-    Raises:
-        BlastEnvError: If the file is missing, damaged or no Parquet, has no run record, lacks a
-            column, or has one of another kind.
     """
     path = path_of(path)
     table = read_apart(str(path), checked_table, path, tuple(columns))
@@ -82,15 +71,7 @@ def read_parquet(
 
 
 def read_frame(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
-    """Read a Parquet file without a run record, as `read_parquet` does.
-
-    Args:
-        path: The file.
-        columns: Its columns.
-
-    Raises:
-        BlastEnvError: If the file is missing, damaged or no Parquet, or holds another table.
-    """
+    """Read a Parquet file without a run record, as `read_parquet` does."""
     table = read_apart(str(path), checked_table, path, tuple(columns))
     names = [column.name for column in columns]
     if table.column_names != names:
@@ -104,13 +85,7 @@ def checked_table(path: Path, columns: Sequence[Column] = ()) -> pa.Table:
     """Return the content of a Parquet file; it may take much memory, see `read_parquet`.
 
     Args:
-        path: The file.
         columns: Columns that it must have, among others.
-
-    Raises:
-        BlastEnvError: If the file is missing, damaged or no Parquet, has more than `MOST_VALUES`
-            values, lacks a column, or has one that holds neither numbers nor texts, or not those
-            of its meaning.
     """
     try:
         content = read_regular(path, MOST_BYTES)

@@ -39,10 +39,6 @@ def run_all(
         items: The work; a single item is done in this process.
         workers: Number of items in progress at the same time; 1 for this process alone.
         progress: Called with the finished share of the items.
-
-    Raises:
-        BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
-            killed.
     """
     check_workers("workers", workers)
     count = _processes(workers, len(items))
@@ -92,7 +88,6 @@ def share_of(
     """Return a callback that converts the share of a part to a share of the whole.
 
     Args:
-        progress: Callback for the share of the whole.
         done: Amount of the whole before the part.
         whole: Total amount.
         part: Amount of the part.

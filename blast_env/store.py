@@ -88,11 +88,7 @@ class Store:
             self._connection.close()
 
     def get(self, key: str) -> bytes | None:
-        """Return the entry of a key, or `None` if it is absent or damaged.
-
-        Raises:
-            BlastEnvError: If the file cannot be read.
-        """
+        """Return the entry of a key, or `None` if it is absent or damaged."""
         found = self._run("SELECT checksum, content FROM contents WHERE key = ?", key)
         if not found:
             return None
@@ -106,12 +102,8 @@ class Store:
         """Return the decoded content of a key, or `None` if it is absent or damaged.
 
         Args:
-            key: The key.
             decode: Decodes the entry. It raises `ValueError` for an entry that passes the
                 checksum but is not valid; such an entry counts as damaged.
-
-        Raises:
-            BlastEnvError: If the file cannot be read.
         """
         content = self.get(key)
         try:
@@ -121,11 +113,7 @@ class Store:
             return None
 
     def put(self, key: str, content: bytes) -> None:
-        """Store the entry of a key; the oldest ones may be deleted for it.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
+        """Store the entry of a key; the oldest ones may be deleted for it."""
         insert = "INSERT OR REPLACE INTO contents (key, checksum, content) VALUES (?, ?, ?)"
         self._run(insert, key, _checksum(key, content), content)
         if self.most_bytes is None:
@@ -136,11 +124,7 @@ class Store:
             self._tidy_up(self.most_bytes)
 
     def items(self) -> Iterator[tuple[str, bytes]]:
-        """Yield keys and entries in the order of the keys, without damaged ones.
-
-        Raises:
-            BlastEnvError: If the file cannot be read.
-        """
+        """Yield keys and entries in the order of the keys, without damaged ones."""
         for (key,) in self._run("SELECT key FROM contents ORDER BY key"):
             content = self.get(key)
             if content is not None:

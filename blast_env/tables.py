@@ -98,15 +98,10 @@ def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None 
     """Write a table without its index as CSV, complete or not at all; see `cell_text`.
 
     Args:
-        table: The table.
-        path: The file.
         float_format: Format of numbers, such as "%.6g"; None for all digits.
 
     Returns:
         The path.
-
-    Raises:
-        BlastEnvError: If it cannot be written there.
     """
     texts = table.select_dtypes(exclude=["number", "bool"])
     safe = table.assign(**{str(name): texts[name].map(cell_text) for name in texts})

@@ -31,11 +31,7 @@ surrogates."""
 
 
 def plain_text(text: str) -> str:
-    """Return a text for readers; tabs and line feeds are allowed.
-
-    Raises:
-        ValueError: If it has a character that controls a terminal or a page.
-    """
+    """Return a text for readers; tabs and line feeds are allowed."""
     wrong = STEERING.search(text)
     if wrong is not None:
         raise ValueError(f"must not have the character {wrong[0]!r}")
@@ -84,12 +80,8 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 
     Args:
         name: Name of the count, for the error.
-        value: The value given.
         least: Lower bound, inclusive.
         most: Upper bound, inclusive.
-
-    Raises:
-        BlastEnvError: If it is not an integer or is out of bounds.
     """
     is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_integer or not least <= value <= most:
@@ -100,29 +92,17 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
 
 
 def checked_seed(value: Any, name: str = "seed") -> int:
-    """Return a seed as a plain integer.
-
-    Raises:
-        BlastEnvError: If it is not an integer, is negative or is too large.
-    """
+    """Return a seed as a plain integer."""
     return whole_number(name, value, 0, MOST_SEED)
 
 
 def generator(seed: Any) -> np.random.Generator:
-    """Return the random generator of a seed.
-
-    Raises:
-        BlastEnvError: If it is not an integer, is negative or is too large.
-    """
+    """Return the random generator of a seed."""
     return np.random.default_rng(checked_seed(seed))
 
 
 def finite_number(name: str, value: Any) -> float:
-    """Return a number as a plain float.
-
-    Raises:
-        BlastEnvError: If it is not a number, or is not finite as a float.
-    """
+    """Return a number as a plain float."""
     if isinstance(value, bool | str):
         raise BlastEnvError(f"{name} is {value_text(value)}, must be a number")
     try:
@@ -137,11 +117,7 @@ def finite_number(name: str, value: Any) -> float:
 
 
 def number_pair(name: str, value: Any) -> tuple[float, float]:
-    """Return two finite numbers (x, y).
-
-    Raises:
-        BlastEnvError: If it is anything else.
-    """
+    """Return two finite numbers (x, y)."""
     is_listed = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
     parts = list(value) if is_listed else []
     try:
@@ -153,11 +129,7 @@ def number_pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def real_number(name: str, value: Any, least: float, most: float) -> float:
-    """Return a number as a plain float.
-
-    Raises:
-        BlastEnvError: If it is not a number or is out of bounds; the bounds are inclusive.
-    """
+    """Return a number as a plain float."""
     number = finite_number(name, value)
     if not least <= number <= most:
         raise BlastEnvError(f"{name} is {number:g}, must be a number from {least:g} to {most:g}")
@@ -173,11 +145,7 @@ def is_plain_number(text: str) -> bool:
 
 
 def plain_number(name: str, text: str) -> float:
-    """Return the number of a text: digits, one point, an exponent.
-
-    Raises:
-        BlastEnvError: If it is anything else, or too large.
-    """
+    """Return the number of a text: digits, one point, an exponent."""
     if not is_plain_number(text):
         raise BlastEnvError(f"{name} is {value_text(text)}, must be a number such as 1000 or 0.5")
     return finite_number(name, float(text))
@@ -190,10 +158,6 @@ def typed_number(name: str, text: str, unit: str = "") -> float:
         name: The quantity, for the error.
         text: The text; the unit may follow the number.
         unit: Its unit, such as `kg TNT`, of which the first word is enough.
-
-    Raises:
-        BlastEnvError: If it is not a number, has another unit, or has a comma that may separate
-            thousands.
     """
     number = text.strip()
     for known in filter(None, (unit, unit.partition(" ")[0])):
@@ -213,11 +177,7 @@ def typed_number(name: str, text: str, unit: str = "") -> float:
 
 
 def path_of(value: Any) -> Path:
-    """Return the path of a file or folder.
-
-    Raises:
-        BlastEnvError: If it is not a path, is longer than 4096 characters, or has a null character.
-    """
+    """Return the path of a file or folder."""
     if not isinstance(value, str | os.PathLike):
         raise BlastEnvError(f"path is {value_text(value)}, must be a path")
     text = os.fspath(value)
@@ -246,10 +206,6 @@ def checked_array(
         least: Inclusive lower bound.
         above: Exclusive lower bound.
         dimensions: Required number of dimensions; `None` for any.
-
-    Raises:
-        BlastEnvError: If a value is not a number, not finite or out of bounds; the message gives
-            its place, its value and the bound.
     """
     try:
         array = np.asarray(values, dtype=np.float64)

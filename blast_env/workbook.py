@@ -84,17 +84,12 @@ def write_workbook(
 
     Args:
         record: The run record, with the version of the package.
-        tables: The tables.
         path: The file, with the suffix `.xlsx`; an existing one is replaced.
         units: Units with their meanings, for the sheet that explains the columns.
         max_rows_per_sheet: The most rows of a table on one sheet, its header included.
 
     Returns:
         The path.
-
-    Raises:
-        BlastEnvError: If the suffix is wrong or the file cannot be written there.
-        ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
     """
     if not 2 <= max_rows_per_sheet <= EXCEL_ROWS:
         raise ValueError(

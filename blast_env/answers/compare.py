@@ -46,8 +46,6 @@ def comparison(
 
     Args:
         layouts: The blasts of each layout and of no barrier, and its cost, by its name.
-        threats: Names of the threats.
-        scenario: The site.
     """
     objective = scenario.objective
     rows = []
@@ -194,7 +192,6 @@ def verdict_table(
     """Return the table of buildings; with several threats, the worst of them first.
 
     Args:
-        scenario: The site.
         judged: Name of the layout and of the threat, and the responses.
     """
     found: dict[tuple[str, str], list[tuple[str, BuildingVerdict]]] = {}

@@ -42,10 +42,6 @@ def screening_answer(
     """Yield the level of protection of facades, and the stand-off that each level needs.
 
     Args:
-        scenario: The site.
-        layout: The layout.
-        found: Its screening.
-        required: The requirements.
         gas: The consequences of each worst place by gas dynamics, by the name of the threat.
     """
     yield Line.of(f"required: {'; '.join(requirement.words for requirement in required)}")

@@ -95,9 +95,7 @@ def judged_answer(
     """Yield one row per layout: no barrier, the rules by load, the proposal; and its grid error.
 
     Args:
-        scenario: The site.
         layouts: The layouts by name: no barrier, the proposal, the rules.
-        found: The evaluation of each layout.
     """
     loads = {name: found[layout].load for name, layout in layouts.items()}
     nothing, proposal, *rules = layouts

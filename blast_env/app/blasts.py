@@ -114,9 +114,6 @@ class BlastTask(BlastingTask):
 
         Blasts with a record and pictures are not run again. The worst threat of the layout runs on
         coarser cells at the end, for the grid error.
-
-        Raises:
-            BlastEnvError: If a blast cannot be run.
         """
         engine, store = GasEngine.with_cells(self.cells), BlastStore(self.cache)
         layouts = {"": (), "layout": load_relevant(self.layout)}

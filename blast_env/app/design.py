@@ -32,12 +32,7 @@ class Design:
     active: int = 0
 
     def __post_init__(self) -> None:
-        """Check the layouts.
-
-        Raises:
-            LayoutError: If a layout is not legal.
-            BlastEnvError: If their number is not that of `SLOTS`, or `active` is out of bounds.
-        """
+        """Check the layouts."""
         if len(self.layouts) != len(SLOTS):
             raise BlastEnvError(f"layouts: there are {len(self.layouts)}, must be {len(SLOTS)}")
         if not 0 <= self.active < len(SLOTS):
@@ -51,11 +46,7 @@ class Design:
         return self.layouts[self.active]
 
     def with_layout(self, layout: Layout, slot: int | None = None) -> "Design":
-        """Return the design with another layout in a slot, by default the active one.
-
-        Raises:
-            LayoutError: If it is not legal.
-        """
+        """Return the design with another layout in a slot, by default the active one."""
         number = self.active if slot is None else slot
         layouts = [*self.layouts]
         layouts[number] = LayoutState.of(self.scenario.without_budget, layout).layout
@@ -86,9 +77,6 @@ class Design:
         Args:
             record: Plain data, as `record` gives it.
             source: Source of the record, for the error.
-
-        Raises:
-            BlastEnvError: If it is no design; the message says why.
         """
         try:
             scenario = Scenario.from_document(record["scenario"], source)
@@ -171,11 +159,7 @@ class History:
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], source: str) -> "History":
-        """Return the history of a record.
-
-        Raises:
-            BlastEnvError: If it is no history; the message says why.
-        """
+        """Return the history of a record."""
 
         def step_of(part: Mapping[str, Any]) -> DesignStep:
             whole = {**part, "scenario": record["sites"][part["scenario"]]}

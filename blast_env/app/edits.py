@@ -86,11 +86,7 @@ def document_of(scenario: Scenario) -> Document:
 
 
 def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
-    """Return a scenario with an edit of its document.
-
-    Raises:
-        ScenarioError: If the result is invalid; the error lists all faults.
-    """
+    """Return a scenario with an edit of its document."""
     document = document_of(scenario)
     edit(document)
     zone = scenario.build_zone
@@ -138,9 +134,6 @@ def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
     """Return the smallest rectangle around a thing, m; around a point, one without extent.
 
     Items and measures have no place: theirs is the rectangle of the build zone.
-
-    Raises:
-        BlastEnvError: If there is no such thing.
     """
     if not has(scenario, thing):
         raise BlastEnvError(f"{scenario.name} has no {thing.kind} {thing.number}")
@@ -165,9 +158,6 @@ def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Site
     """Return the topmost thing at a place, or `None`; the site itself does not count.
 
     Args:
-        scenario: The scenario.
-        x_m: The place.
-        y_m: The place.
         reach_m: Greatest distance from a point or a line that still selects it.
     """
     for thing in _from_the_top(scenario):
@@ -211,11 +201,7 @@ def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float
 
 
 def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
-    """Return the scenario with a thing moved by about `by_m`, onto the grid.
-
-    Raises:
-        ScenarioError: If it cannot be there.
-    """
+    """Return the scenario with a thing moved by about `by_m`, onto the grid."""
     if thing.kind in NOWHERE:
         return scenario
     corner = rectangle_of(scenario, thing)
@@ -241,9 +227,6 @@ def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:
     """Return the scenario with the upper right corner of a thing at another point of the grid.
 
     Of a line, the end moves there; a thing without extent does not change.
-
-    Raises:
-        ScenarioError: If it cannot have that size.
     """
     old = rectangle_of(scenario, thing)
     width_m = max(snapped(corner_m[0] - old.left), MODULE_SIDE_M)
@@ -270,14 +253,10 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
     """Return the scenario with other values of a thing.
 
     Args:
-        scenario: The scenario.
         thing: The thing; `None` is the scenario itself.
         values: New values by key of the scenario file; `None` removes a key. The facade of a
             structure, and whether it is protected, are those of its whole building. A charge takes
             the mass of the preset that its new `threat` names.
-
-    Raises:
-        ScenarioError: If the result is invalid.
     """
 
     def edit(document: Document) -> None:
@@ -302,12 +281,7 @@ def _parts_of(document: Document, thing: SiteThing | None, own: Document) -> lis
 
 
 def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
-    """Return the scenario without a thing.
-
-    Raises:
-        ScenarioError: If the site needs it: the last charge, the last protected structure.
-        BlastEnvError: If it is the site.
-    """
+    """Return the scenario without a thing."""
     if thing.kind is ThingKind.SITE:
         raise BlastEnvError("the site itself cannot be deleted: open another one")
 
@@ -335,9 +309,6 @@ def added(
     the rectangle between them. A build zone replaces the old one and keeps its other values. A
     structure is `height_m` high, one storey by default, `None` for the height of the air; it stands
     on the terrace below it.
-
-    Raises:
-        ScenarioError: If it cannot be there.
     """
     start = (snapped(start_m[0]), snapped(start_m[1]))
     end = (snapped(end_m[0]), snapped(end_m[1]))

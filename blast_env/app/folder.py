@@ -74,11 +74,7 @@ class DesignFolder:
         return self.path / "blasts"
 
     def save(self, history: History) -> None:
-        """Save a design with its steps.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
+        """Save a design with its steps."""
         content = json.dumps(history.record(), allow_nan=False)
         with write_atomically(self.path / _DESIGN) as temporary:
             temporary.write_text(content, encoding="utf-8")
@@ -88,19 +84,11 @@ class DesignFolder:
         return read_kept(DesignSettings, self.path / _SETTINGS)
 
     def keep_settings(self, settings: DesignSettings) -> None:
-        """Save the settings of its page.
-
-        Raises:
-            BlastEnvError: If they cannot be written.
-        """
+        """Save the settings of its page."""
         write_kept(settings, self.path / _SETTINGS)
 
     def load(self) -> History:
-        """Return the design with its steps.
-
-        Raises:
-            BlastEnvError: If it cannot be read.
-        """
+        """Return the design with its steps."""
         return History.from_record(self._content(), str(self.path / _DESIGN))
 
     def entry(self) -> DesignEntry:
@@ -171,11 +159,7 @@ class WorkFolder:
         """Return the folder of a new design.
 
         Args:
-            scenario: Its site.
             label: Label of the first step: the source of the site.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
         """
         folder = DesignFolder(self._designs / secrets.token_hex(6))
         for path in (folder.path, folder.jobs, folder.blasts):
@@ -184,11 +168,7 @@ class WorkFolder:
         return folder
 
     def open(self, design_id: str) -> DesignFolder:
-        """Return the folder of a design.
-
-        Raises:
-            BlastEnvError: If no design has that name.
-        """
+        """Return the folder of a design."""
         folder = DesignFolder(self._designs / check_key(design_id))
         if not (folder.path / _DESIGN).is_file():
             raise BlastEnvError(f"there is no design {design_id!r} in {self.path}")
@@ -200,9 +180,6 @@ class WorkFolder:
 
         Args:
             url: Address of this server, for the message of others.
-
-        Raises:
-            BlastEnvError: If another server holds it, or it cannot be held.
         """
         mark = self.path / _OPEN
         # The system frees the lock of a killed process, too.

@@ -133,11 +133,7 @@ def _bracketed(host: str) -> str:
 
 
 def check_port(host: str, port: int) -> None:
-    """Refuse an unusable port, before anything is started.
-
-    Raises:
-        BlastEnvError: If it is in use, or may not be used.
-    """
+    """Refuse an unusable port, before anything is started."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

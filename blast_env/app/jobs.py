@@ -151,15 +151,11 @@ class Workers:
         """Queue work.
 
         Args:
-            task: The work.
             jobs: Parent of its folder.
             title: Its title on the page.
 
         Returns:
             The folder of the work.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
         """
         folder = jobs / f"{len(list(jobs.iterdir())):04}-{secrets.token_hex(4)}"
         make_folder(folder)

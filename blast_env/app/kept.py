@@ -45,11 +45,7 @@ class DesignSettings(FileRecord):
 
 
 def write_kept(record: FileRecord, path: Path) -> None:
-    """Write a record, the whole file or none.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
+    """Write a record, the whole file or none."""
     with write_atomically(path) as temporary:
         temporary.write_text(record.model_dump_json(), encoding="utf-8")
 
@@ -63,11 +59,7 @@ def read_kept(kind: type[AnyKept], path: Path) -> AnyKept | None:
 
 
 def check_key(key: str) -> str:
-    """Return the name of a folder from outside, once it is checked.
-
-    Raises:
-        BlastEnvError: If it is not 1 to 100 letters, digits, `_` or `-`, and could lead elsewhere.
-    """
+    """Return the name of a folder from outside, once it is checked."""
     if re.fullmatch(r"[A-Za-z0-9_-]{1,100}", key) is None:  # longer ones are no names of folders
         raise BlastEnvError(f"{key[:100]!r} is no name of a design or a blast")
     return key

@@ -59,11 +59,7 @@ def plain(layout: Iterable[Element]) -> PlainLayout:
 
 
 def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
-    """Return the layout of data, whether or not it is legal.
-
-    Raises:
-        LayoutError: If the data are no layout for this site.
-    """
+    """Return the layout of data, whether or not it is legal."""
     if scenario.build_zone is None:
         if data:
             raise LayoutError(f"{scenario.name} has no build zone: no barrier can be placed")

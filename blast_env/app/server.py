@@ -111,9 +111,6 @@ def serve(entrance: Entrance, folder: Path) -> None:
     Args:
         entrance: The address of the page, and its secret.
         folder: The work folder.
-
-    Raises:
-        BlastEnvError: If the port cannot be used, or another server has the folder open.
     """
     check_port(entrance.host, entrance.port)
     work, workers = WorkFolder(folder), Workers()

@@ -225,7 +225,6 @@ class Session:
         """Search for a layout against the chosen threats, or propose one without a blast.
 
         Args:
-            method: Name of the proposer.
             budget: Most blasts, for a proposer that runs any.
 
         Raises:
@@ -273,7 +272,6 @@ class Session:
         """Ask a question on the active layout under the chosen threats, by gas dynamics.
 
         Args:
-            question: The question.
             target: Required level of protection.
             mass_error: Uncertainty of the masses; see `Uncertainty`.
             budget: Most blasts of a search of advice.

@@ -30,11 +30,7 @@ MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf", ".ifc")
 
 
 def blank_site(width_m: float, height_m: float) -> Scenario:
-    """Return a site with only what a site must have: a building to protect, and a charge.
-
-    Raises:
-        ScenarioError: If a side is out of bounds.
-    """
+    """Return a site with only what a site must have: a building to protect, and a charge."""
     x_m, y_m = snapped(0.5 * width_m), snapped(0.5 * height_m)
     house = {"kind": "ModularObstacle", "name": "building", "rows": 8, "columns": 8}
     house |= {"corner_m": [x_m - 2.0, y_m - 2.0], "height_m": STOREY_M, "protected": True}
@@ -49,11 +45,7 @@ def blank_site(width_m: float, height_m: float) -> Scenario:
 
 
 def site_of_file(path: Path) -> Scenario:
-    """Return the site of a file.
-
-    Raises:
-        BlastEnvError: If it is no site; the message lists all its faults.
-    """
+    """Return the site of a file."""
     return _by_ending(path, SITES, "a site")(path)
 
 
@@ -66,11 +58,7 @@ def imported_site(path: Path, options: "ImportOptions") -> "SiteImport":
     """Return the site of a map or drawing, and its deviations.
 
     Args:
-        path: The file.
         options: The user's choices; a build zone in the map overrides one around buildings.
-
-    Raises:
-        BlastEnvError: If it cannot be imported, or a required package is not installed.
     """
     from blast_env.io.importing import import_site  # here, because it needs the extra `maps`
 
@@ -82,22 +70,14 @@ def imported_site(path: Path, options: "ImportOptions") -> "SiteImport":
 
 
 def map_sketch(path: Path, options: "ImportOptions") -> "MapSketch":
-    """Return the outlines of the buildings of a map or drawing.
-
-    Raises:
-        BlastEnvError: If it cannot be read, or has no building.
-    """
+    """Return the outlines of the buildings of a map or drawing."""
     from blast_env.io.importing.convert import sketch_of  # here, because it needs `maps`
 
     return sketch_of(path, options)
 
 
 def layout_of_file(path: Path) -> LayoutFile:
-    """Return the layout of a file.
-
-    Raises:
-        BlastEnvError: If it is no layout.
-    """
+    """Return the layout of a file."""
     return _by_ending(path, {".json": LayoutFile.load}, "a layout")(path)
 
 

@@ -117,11 +117,7 @@ class AnswerTask(BlastingTask):
     budget: int
 
     def __call__(self, writer: StatusWriter) -> None:
-        """Answer the question, and keep the answer in a file.
-
-        Raises:
-            BlastEnvError: If it cannot be answered; the message is for the user.
-        """
+        """Answer the question, and keep the answer in a file."""
         changes: dict[str, object] = {}
         if self.question is Question.ADVISE:
             layout, parts = self._advice(writer)

@@ -161,11 +161,7 @@ than the best rule, by the judge's cells."""
 
 
 def find_definition(name: str) -> Definition:
-    """Return a problem's definition.
-
-    Raises:
-        UnknownNameError: If there is no such problem; the message names the nearest one.
-    """
+    """Return a problem's definition."""
     if name not in DEFINITIONS:
         raise UnknownNameError("problem", name, DEFINITIONS)
     return DEFINITIONS[name]

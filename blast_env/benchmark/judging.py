@@ -247,11 +247,7 @@ def _judged(
 
 
 def read_submission(path: Path) -> Submission:
-    """Read a submission, also one judged before.
-
-    Raises:
-        BlastEnvError: If it is damaged, or no submission to these problems.
-    """
+    """Read a submission, also one judged before."""
     kinds: tuple[type[Any], ...] = (Submission, SubmissionJudgement)
     found: Any = read_runs(path, *kinds)
     submission: Submission = found.submission if isinstance(found, SubmissionJudgement) else found

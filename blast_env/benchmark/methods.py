@@ -58,12 +58,7 @@ def _by_rule(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout
 
 
 def find_method(name: str) -> Method:
-    """Return a method by the name of a proposer, or by `module:object`.
-
-    Raises:
-        UnknownNameError: If the proposer is unknown.
-        BlastEnvError: If the module or object does not exist or is not callable.
-    """
+    """Return a method by the name of a proposer, or by `module:object`."""
     if ":" not in name:
         is_rule = proposer_row(name).kind is ProposerKind.RULE
         return partial(_by_rule if is_rule else _proposed, find_proposer(name))
@@ -122,10 +117,6 @@ def entries(
         names: Names as for `find_method`, or `RULES`.
         asked: The budgets that were asked for; see `budgets_of`.
         sites: The sites of the problems.
-
-    Raises:
-        UnknownNameError: If a proposer is unknown.
-        BlastEnvError: If a method needs blasts, and the budget is 0.
     """
     for name in names:
         for proposer in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
@@ -145,10 +136,7 @@ def references_of(
     """Return the references of problems without stored ones, from the rules and submissions.
 
     Args:
-        definitions: The problems by name.
-        played: The submissions.
         cell_m: Side of the cells, m.
-        cache: Store of the blasts.
         guided: Makes a problem of a budget for the search by the surrogate, a further source.
     """
     found, engine = {}, find_engine(JUDGE, cell_m)
@@ -174,7 +162,6 @@ def reference_of(
     """Return the reference layouts of a problem's score: the best rule and the best known layout.
 
     Args:
-        definition: The problem.
         evaluator: Runs the blasts of the comparison.
         more: Further known layouts, by the name of their source.
         cell: Side of the evaluator's cells; see `cell_key`.

@@ -197,12 +197,8 @@ def shares_of(
 
     Args:
         case: The case, with its threats.
-        layouts: The layouts.
         evaluator: Runs the blasts.
         processes: Number of worker processes.
-
-    Raises:
-        BlastEnvError: If the objective without a barrier is 0.
     """
     pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
     loads = [

@@ -151,13 +151,8 @@ def read_runs(path: str | Path, kind: type[Runs], *others: type[Runs]) -> Runs:
     """Return the content of a file of runs; a large one is read in a separate process with limits.
 
     Args:
-        path: The file.
         kind: Its dataclass.
         others: Further dataclasses, for a file with their `format`.
-
-    Raises:
-        BlastEnvError: If it cannot be read, is not JSON, has more than `MOST_RUNS` runs, is of
-            another form, or takes too much time or memory; the message begins with the file.
     """
     path = path_of(path)
     try:
@@ -185,11 +180,7 @@ def _runs_in(path: Path, kinds: tuple[Any, ...]) -> Any:
 
 
 def write_runs(path: str | Path, record: Any) -> Path:
-    """Write a dataclass with `runs` as JSON, one run per line.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
+    """Write a dataclass with `runs` as JSON, one run per line."""
     rest = {name: value for name, value in asdict(record).items() if name != "runs"}
     lines = ",\n".join(f"    {json.dumps(asdict(run))}" for run in record.runs)
     head = json.dumps(rest, indent=2, allow_nan=False)[:-2]

@@ -167,9 +167,6 @@ def numbers(option: str, text: str, form: str) -> tuple[Any, ...]:
     """Return the numbers of a text with commas, as in a form such as `X,Y[,KG]`.
 
     Brackets enclose a number that may be left out.
-
-    Raises:
-        BlastEnvError: If the text has another form.
     """
     most = form.count(",") + 1
     counts = range(most - form.count("["), most + 1)

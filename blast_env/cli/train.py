@@ -171,8 +171,6 @@ def _train(
     """Train in a new run folder, with settings and changes other than the defaults.
 
     Args:
-        run: The folder.
-        algorithm: Name of the algorithm.
         scenario: Name or path of the scenario, or the name of generated sites.
         site: The scenario, or one of the generated sites.
         given: The settings given as options of their own.

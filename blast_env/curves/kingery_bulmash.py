@@ -188,7 +188,6 @@ def oblique(reflected: FloatArray, incident: FloatArray, cosine: FloatArray) -> 
     degrees are 16 to 32 % larger than by this rule; see `blast_env.curves.reflection`.
 
     Args:
-        reflected: The value at normal incidence.
         incident: The value side-on.
         cosine: Cosine of the angle between the wall's normal and the way to the charge.
     """

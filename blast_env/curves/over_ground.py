@@ -79,8 +79,6 @@ def in_the_open(load: Load, ways: Ways, charge_kg: float, height_m: float) -> Fl
     `oblique`; elsewhere they are those of the incident wave at the same distance.
 
     Args:
-        load: Peaks or impulses.
-        ways: Ways of the waves.
         charge_kg: TNT-equivalent mass, above 0.
         height_m: Height of the charge above the ground.
     """
@@ -99,8 +97,6 @@ def normally_reflected(
     Both waves of a raised charge come from the same distance, which is on the safe side.
 
     Args:
-        load: Peaks or impulses.
-        distance_m: Distances from the charge.
         charge_kg: TNT-equivalent mass, above 0; broadcast against the distances.
         height_m: Height of the charge above the ground.
     """

@@ -144,7 +144,6 @@ class _Vehicles:
         """Return the least scaled distance of all vehicles, m / kg^(1/3).
 
         Args:
-            placement: The placement.
             without_speed: Whether all crash-rated pieces count as holding, which is a fast upper
                 bound.
         """

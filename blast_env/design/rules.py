@@ -136,12 +136,8 @@ def wall_added_to(
 
     Args:
         placement: The placement to extend.
-        charge_m: Place of the charge.
         share: As for `line_of_sight_wall`.
         kind: As for `line_of_sight_wall`.
-
-    Raises:
-        BlastEnvError: As for `line_of_sight_wall`.
     """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
@@ -260,9 +256,6 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         charge: The charge; `None` for a layout against all charges of the scenario.
-
-    Raises:
-        BlastEnvError: If the scenario has no build zone.
     """
     found = find_scenario(scenario)
     # The lines are those of the known charge; the legal places keep off all possible ones.
@@ -410,7 +403,6 @@ class _View:
             number: Index of the variant.
             legal: Mask of its legal places (rows, columns).
             wall_m: Depth of the wall.
-            end: The end of the wall.
         """
         aside_m, half_width_m = self.aside_m[number], float(self.half_width_m[number])
         start_m = end.side * aside_m - half_width_m
@@ -442,11 +434,7 @@ class _View:
 
 
 def _line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, float]:
-    """Return the direction from a charge to the centre of the protected structures; its length, m.
-
-    Raises:
-        BlastEnvError: If the charge is there.
-    """
+    """Return the direction from a charge to the middle of what is protected; its length, m."""
     target_x_m, target_y_m = _protected_middle_m(scenario)
     along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
     distance_m = hypot(along_x, along_y)
@@ -494,11 +482,7 @@ def _ring(placement: LayoutState, around: Rectangle, start_m: PointM) -> Layout:
 
     Args:
         placement: The empty placement.
-        around: The rectangle.
         start_m: A point outside the rectangle.
-
-    Raises:
-        BlastEnvError: If the point is at the centre of the rectangle.
     """
     turn_rad, gap_m, lies_along = _around(placement, around, start_m)
     variants = placement.catalogue.variants

@@ -52,11 +52,7 @@ class Campaign:
         coarser: Engine | None = None,
         cache: str | Path | BlastStore | None = None,
     ) -> "Campaign":
-        """Return the campaign of a site, with a store of its own or in a folder.
-
-        Raises:
-            BlastEnvError: If the engine cannot compute the loads that the objective needs.
-        """
+        """Return the campaign of a site, with a store of its own or in a folder."""
         found, store = find_scenario(site), BlastStore.of(cache)
         evaluators = (
             None if engine_used is None else BlastEvaluator(found, engine_used, cache=store)
@@ -92,11 +88,6 @@ class Campaign:
             progress: Called with the finished share of the blasts.
             drawing: Draws each blast; all are run for it.
             worst: Returns the number of the threat that governs, which runs on coarser cells too.
-
-        Raises:
-            BlastEnvError: If a threat is repeated.
-            LayoutError: If a layout does not fit the build zone.
-            ScenarioError: If a charge is not clear of a structure or the border.
         """
         # Coarser cells cost an eighth of the cells and half of the steps: their share of the
         # progress.

@@ -493,11 +493,7 @@ class BlastRecord:
 
     @property
     def complete(self) -> BlastDetails:
-        """The details.
-
-        Raises:
-            BlastEnvError: If the engine gives loads alone.
-        """
+        """The details."""
         if self.details is None:
             raise BlastEnvError("the engine records no walls and bays: must be 'gas'")
         return self.details
@@ -528,11 +524,7 @@ class BlastRecord:
 
     @classmethod
     def decoded(cls, content: bytes) -> Self:
-        """Return the record of its bytes.
-
-        Raises:
-            ValueError: If they are damaged.
-        """
+        """Return the record of its bytes."""
         line, _, arrays = content.partition(b"\n")
         header = _HEADER.validate_json(line)
         # The arrays follow each other without a mark: the header has their sizes.

@@ -133,7 +133,6 @@ def shape_to_double(
     Args:
         shape: Cells along x, y and z of a grid with ground below and otherwise open borders.
         buffer_layers: Layers of the skirt; each doubling takes one.
-        times: Number of doublings.
     """
     # A layer at each open end comes from the skirt, so the shape is extended to what then divides.
     ends = (2, 2, 1) if buffer_layers else (0, 0, 0)

@@ -165,7 +165,6 @@ def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
     """Return the cost of blasts one after the other, in words.
 
     Args:
-        costs: The cost of each.
         drawn: Number of blasts with a film, maps or walls.
     """
     if not costs:

@@ -48,9 +48,7 @@ class Faces:
         then those normal to y and z.
 
         Args:
-            grid: The grid.
             shape: Cells of the kernels' arrays along z, y and x.
-            lanes: Number of cells in a vector.
 
         Returns:
             Lane of the cell and index of the face (n, 2); first entry of each vector, and the end.
@@ -77,7 +75,6 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
     """Return the faces of chosen solid cells that touch air inside the grid.
 
     Args:
-        grid: The grid.
         cells: Mask of the chosen cells (nx, ny, nz), all solid.
 
     Raises:

@@ -150,7 +150,6 @@ def _at_faces(
     """Return the variables of cells at their low and high faces after half a step.
 
     Args:
-        state: The state.
         low: Variables of the neighbours on the low side.
         here: Those of the cells.
         high: Those of the neighbours on the high side.
@@ -200,7 +199,6 @@ def _hllc(state: Any, left: Variables, right: Variables, wall: Any, fuel: bool) 
     """Return the fluxes through faces from the variables on their two sides.
 
     Args:
-        state: The state.
         left: Variables on the low side of the faces.
         right: Those on the high side.
         wall: Below 0 at walls, where the contact rests.
@@ -380,7 +378,6 @@ def _sweep_run(
         stride: Distance of vectors.
         first: Coordinate of the first vector.
         end: That of the last one + 1.
-        axis: The axis.
         along: Whether it is x, along which vectors lie.
         ahead: Distance of the vectors to be moved later, which are loaded into the cache.
         fuel: Whether the state has fuel.
@@ -554,7 +551,6 @@ def sweep(
         airy: Whether vectors have a cell of air (z, y, vectors).
         extent: Cells outside which air is still, extended along the axes (z, y, 2).
         axes: The axes of the sweeps, 0 for x: y and -1, or x and z in any order.
-        first: First layer.
         end: Last layer + 1.
         measure: Whether to note the speeds of signals in the last sweep.
         ratio: Ratio of time step to cell side.

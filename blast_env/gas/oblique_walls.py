@@ -62,7 +62,6 @@ class ObliqueLoads:
         """Attach a recorder to a run that has not begun; return `None` without an oblique wall.
 
         Args:
-            run: The run.
             structures: The structures of its scenario.
         """
         from blast_env.gas.probes import PatchHistories
@@ -119,9 +118,6 @@ def _bays(
 
     Args:
         table: The faces of cells.
-        own: The faces of the wall.
-        wall: The wall.
-        structure: Its structure.
     """
     # Bays along the wall of about the facade's width, and storeys above its base.
     facade = structure.facade

@@ -165,11 +165,7 @@ class GasSettings:
 
 
 def _seconds(until: object) -> float:
-    """Return the duration of a run.
-
-    Raises:
-        BlastEnvError: If it is not a number of seconds above 0.
-    """
+    """Return the duration of a run."""
     try:
         seconds = float(until) if isinstance(until, str) else finite_number("until", until)
     except (ValueError, BlastEnvError):

@@ -314,7 +314,6 @@ class GasSolver:
         Without `land`, the division of a run into calls does not change its results.
 
         Args:
-            until_s: Simulated time.
             land: Whether to shorten the last step so that it ends at `until_s`.
         """
         while self.time_s < until_s:

@@ -203,7 +203,6 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
 
     Args:
         solver: Created with `with_fuel=True` and `burning=charge.burning`.
-        charge: The charge.
         radius_m: Radius of the front, `largest_radius_m` by default. Loads depend on it (by some
             per cent), so use the same for all runs in a comparison.
 
@@ -238,8 +237,6 @@ def largest_radius_m(
     mapped onto the grid as its mirror image. It is at most the distance to the farthest corner.
 
     Args:
-        grid: The grid.
-        charge: The charge.
         kept_clear: Further cells to treat as solid (nx, ny, nz), the possible places of a barrier.
             The charge may be among them.
 

@@ -74,7 +74,6 @@ def spherical_stage(charge: GasCharge, radius_m: float) -> SphericalStage:
     """Compute the first stage of a blast, in somewhat less than a second.
 
     Args:
-        charge: The charge.
         radius_m: Radius of the front at which the grid takes over.
     """
     # 1. The blast at the time when the grid takes over: where its front is, and when.

@@ -241,9 +241,7 @@ def merge(
 
     Args:
         fine: State of the smaller cells.
-        fine_code: Codes of the smaller cells.
         coarse: State of the larger cells, updated in place; cells without air are unchanged.
-        coarse_code: Codes of the larger cells.
         z_start: First layer of smaller cells in each layer of larger cells, and the end (nz + 1,).
         y_start: The same along y.
         x_start: The same along x.

@@ -168,7 +168,6 @@ def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
     """Return one row per module face that touches air; see `MODULE_COLUMNS`.
 
     Args:
-        run: The run.
         faces: Its `face_table`.
     """
     table = _grouped(
@@ -194,7 +193,6 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
     """Return one row per wall or roof of a structure; see `WALL_COLUMNS`.
 
     Args:
-        run: The run.
         faces: Its `face_table`, whose column `share` is the area ratio of real wall to face.
     """
     # The barrier has no walls of its own: its pieces stand for themselves.
@@ -215,7 +213,6 @@ def structure_table(
     """Return one row per structure or building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
 
     Args:
-        run: The run.
         faces: Same as for `wall_table`.
         buildings: The building of each structure, by name; `None` for one row per structure.
         stepped: The buildings with a wall that is a staircase.

@@ -62,7 +62,6 @@ def _exact_costs(
     summed from the largest down until an addition rounds; (3) a tie is rounded by the next one.
 
     Args:
-        indices: The layouts.
         numbers: Numbers of the elements of all layouts (layouts, most elements).
         placed: Number of elements in each (layouts,).
         costs: Cost by the element's number, in any shape.
@@ -113,13 +112,11 @@ def limit_to_budget(
     """Take away the places of some layouts that cost more than what is left of the budget.
 
     Args:
-        indices: The layouts.
         numbers: Numbers of the elements of all layouts (layouts, most elements).
         placed: Number of elements in each (layouts,).
         budget_left: What is left of the budget, updated in place (layouts,).
         legal: See `LayoutBatch`; updated in place.
         costs: Cost by the element's number, in any shape.
-        budget: The budget.
         most: The same with an allowance for rounding.
         dearest: The largest cost at a legal place.
     """

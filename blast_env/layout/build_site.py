@@ -31,9 +31,6 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     """Return independent generators for the charge, the fan and the air.
 
     Separate streams keep fan and air unchanged if the charge is fixed.
-
-    Raises:
-        BlastEnvError: If the seed is not an integer, is negative or too large.
     """
     return tuple(map(np.random.default_rng, np.random.SeedSequence(checked_seed(seed)).spawn(3)))
 
@@ -62,8 +59,6 @@ def worst_places(
     """Return the worst places of a vehicle's charge against a layout.
 
     Args:
-        scenario: The scenario.
-        source: The vehicle.
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
     """
     return scenario.vehicle_ground(source, layout).worst_places(_obstacles(scenario, layout))
@@ -87,7 +82,6 @@ def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCha
     """Return a charge at its place, which for a vehicle depends on the layout.
 
     Args:
-        scenario: The scenario.
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
         charge: The charge; a `Charge` is returned unchanged.
     """
@@ -117,7 +111,6 @@ def build_site(
     """Return the site of one blast.
 
     Args:
-        scenario: The scenario.
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
         seed: Seed of the charge if the scenario has several; the same charge as for particles.
         charge: The charge, instead of one drawn from the scenario.
@@ -150,11 +143,7 @@ def build_site(
 
 
 def _check_clear(scenario: Scenario, layout: Layout) -> None:
-    """Refuse a layout with a module on the charge, the only condition that a charge can break.
-
-    Raises:
-        LayoutError: If there is one.
-    """
+    """Refuse a layout with a module on the charge, the only condition that a charge can break."""
     usable = usable_cells(scenario)
     if not all(usable[cell] for cell in LayoutState(scenario, layout).cells):
         check_layout(scenario, tuple(layout))  # a plain one, which is not known to be legal here
@@ -194,12 +183,7 @@ def _whole(scenario: Scenario) -> StructureOutline:
 
 
 def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
-    """Return the barrier of a layout in the build zone.
-
-    Raises:
-        BlastEnvError: If there is no build zone.
-        LayoutError: If the catalogue has no such item, or it cannot be turned.
-    """
+    """Return the barrier of a layout in the build zone."""
     # A barrier is one structure of modules; each stands on the ground below it, which may be a
     # terrace.
     zone, modules = scenario.zone, scenario.zone.modules(layout)

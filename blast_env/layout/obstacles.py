@@ -26,9 +26,6 @@ def obstacles_of(scenario: Scenario, layout: Iterable[Element]) -> Obstacles:
 
     Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
     terrace are out of reach, and no obstacles.
-
-    Raises:
-        LayoutError: If there is no such item, or it cannot be turned.
     """
     met, parts = scenario.obstacles_met, list[Obstacles]()
     # In the order of their places, so that equal layouts have equal obstacles, and one search.

@@ -86,7 +86,6 @@ def explosion_fan(
     the mean kinetic energy is the same.
 
     Args:
-        parameters: The explosive's parameters, for this charge.
         centre: The charge's centre, units.
         rng: Generator for the phase of the fan and the random part of the velocities.
     """
@@ -120,7 +119,6 @@ def air_lattice(
     A ball that would touch an obstacle, the charge or the border is left out.
 
     Args:
-        parameters: The air's parameters.
         site: The simulated area, units.
         obstacles: Rectangles without air, units.
         charge_centre: The charge's centre, units.

@@ -22,7 +22,6 @@ def write_blast(blast: BlastTables, path: str | Path, max_rows_per_sheet: int = 
     """Write a workbook with the sheets `Run`, `Structures`, `Modules`, `Collisions`, `Columns`.
 
     Args:
-        blast: The blast.
         path: The file, with the suffix `.xlsx`; an existing one is replaced.
         max_rows_per_sheet: The most rows of a table on one sheet, its header included.
 

@@ -139,9 +139,7 @@ def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
     ball at rest leaves a collision with at most twice the speed of the ball that hits it.
 
     Args:
-        balls: The remaining balls.
         scene: The scene; its barrier does not count as a structure.
-        within_s: The remaining time.
     """
     # A bound that is cheap and never wrong: straight distance to the nearest structure against the
     # farthest way that is left.

@@ -74,7 +74,6 @@ def build_scene(
     """Return the scene of one blast by particles, which is two-dimensional.
 
     Args:
-        scenario: The scenario.
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
         seed: Seed of the charge (if the scenario has several), the fan's phase and the air's
             jitter. None of them depends on the barrier.
@@ -127,11 +126,7 @@ def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParamete
 
 
 def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
-    """Refuse a raised charge that is inside a structure in plan.
-
-    Raises:
-        ScenarioError: If it is.
-    """
+    """Refuse a raised charge that is inside a structure in plan."""
     if charge.height_m == 0.0:
         return
     x_m, y_m = charge.position_m

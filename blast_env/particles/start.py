@@ -28,7 +28,6 @@ def start_event(scene: "Scene", cell_units: float | None = None) -> "EventRun":
     """Return a run at time 0 from one collision to the next.
 
     Args:
-        scene: The scene.
         cell_units: Side of the cells of the neighbour search; see `world_of`.
     """
     from blast_env.particles.event.engine import EventRun  # Numba takes half a second to import

@@ -184,7 +184,6 @@ class ModularPart:
         """Count one collision.
 
         Args:
-            time_s: Its time.
             impulse: Its m |v|, simulation units.
             transferred_impulse: Its transferred momentum, simulation units.
         """
@@ -303,11 +302,7 @@ class ConcreteSquare(ModularObstacle):
     """A square concrete structure: as many rows as columns of modules (section 2.7)."""
 
     def __post_init__(self) -> None:
-        """Create the parts, after a check of the shape.
-
-        Raises:
-            ValueError: If rows and columns differ.
-        """
+        """Create the parts, after a check of the shape."""
         if self.rows != self.columns:
             raise ValueError(
                 f"ConcreteSquare {self.name!r} has {self.rows} rows and {self.columns} columns, "

@@ -39,7 +39,6 @@ def calibration_figure(report: CalibrationReport, name: str) -> Figure:
     """Return a figure of the simulated impulse, of the laws and the reference, and of residuals.
 
     Args:
-        report: The report.
         name: Name of the calibration, for the heading.
     """
     figure = Figure(figsize=(12.0, 8.6), layout="constrained")

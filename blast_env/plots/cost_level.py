@@ -56,7 +56,6 @@ def cost_level_figure(
         tried: The layouts tried, by kind of measures.
         judged: The best layout of each kind, by the search and by the judge.
         target: The required level.
-        title: Title of the picture.
         words: Engines of the search and of the judge, as `gas, cells of 0.5 m`.
         axis: Label of the axis of costs.
     """

@@ -129,10 +129,6 @@ def evaluation_figure(evaluation: Evaluation, title: str) -> Figure:
 
     On the left the site with the layout and all charges, coloured by the reduction of their
     impulse. On the right the load of each threat without and with the barrier.
-
-    Args:
-        evaluation: The evaluation.
-        title: Its title.
     """
     site = evaluation.scenario.site
     least_in, most_in = _PLAN_WIDTHS_IN

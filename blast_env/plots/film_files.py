@@ -71,7 +71,6 @@ def plan_until(
     """Plan the moments of a film that ends at a simulated time; it lasts 8 to 12 s.
 
     Args:
-        end_s: The simulated time.
         frames_per_s: Frames per second of the film.
         slow_motion: Seconds of the film per second of the blast, instead of the factor for the
             usual duration.
@@ -100,11 +99,7 @@ def _usual_slow_motion(end_s: float) -> float:
 
 
 def plan_gif(plan: FilmPlan) -> FilmPlan:
-    """Return a plan that keeps a GIF small.
-
-    Raises:
-        BlastEnvError: If it would have more than 300 frames.
-    """
+    """Return a plan that keeps a GIF small."""
     frames_per_s = min(plan.frames_per_s, _GIF_FRAMES_PER_S)
     # The duration of a frame in a GIF is a multiple of 0.01 s.
     frames_per_s = 100.0 / round(100.0 / frames_per_s)
@@ -134,11 +129,7 @@ class Footage(NamedTuple):
 
 
 def known_suffix(path: str | Path) -> str:
-    """Return the suffix of a film in lower case.
-
-    Raises:
-        BlastEnvError: If it is none of `SUFFIXES`.
-    """
+    """Return the suffix of a film in lower case."""
     suffix = path_of(path).suffix
     if suffix.lower() not in SUFFIXES:
         raise BlastEnvError(
@@ -160,9 +151,6 @@ def save_frames(
         plan: The plan, for a GIF one from `plan_gif`.
         title: Title in the metadata; a GIF has none.
         comment: Comment in the metadata.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
     """
     if suffix == ".gif":
         _save_gif(frames, path, plan.frames_per_s, comment)

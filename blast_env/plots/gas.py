@@ -82,11 +82,7 @@ KINDS: Final = {
 
 
 def kind_of(quantity: str) -> Kind:
-    """Return the presentation of a quantity.
-
-    Raises:
-        UnknownNameError: If there is no such quantity.
-    """
+    """Return the presentation of a quantity."""
     if quantity not in KINDS:
         raise UnknownNameError("quantity", quantity, KINDS)
     return KINDS[quantity]
@@ -107,11 +103,7 @@ def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
 
 
 def check_comparable(blasts: Sequence[GasBlast]) -> None:
-    """Check that blasts have the same site and the same charge or vehicle.
-
-    Raises:
-        BlastEnvError: If one of them differs.
-    """
+    """Check that blasts have the same site and the same charge or vehicle."""
     first = blasts[0]
     for blast in blasts[1:]:
         if blast.site.site_m != first.site.site_m:
@@ -395,7 +387,6 @@ def gauge_history(
 
     Args:
         result: The blast.
-        gauge: Name of the gauge.
         free_field: Whether to draw Kingery and Bulmash's incident wave at its distance, with
             Friedlander's waveform: the wave at the same place on an empty site.
         beside: Another result with the same site and charge, drawn into the same axes.

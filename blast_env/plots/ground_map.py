@@ -108,12 +108,7 @@ def _distances_m(grid: GasGrid, opening: SphericalStage) -> FloatArray:
 
 
 def map_levels(result: GasResult, quantity: str) -> tuple[float, ...]:
-    """Return the contour levels of `ground_map`, in Pa s or kPa, for use in further maps.
-
-    Raises:
-        BlastEnvError: If the blast was run without the recorders.
-        UnknownNameError: If there is no such quantity.
-    """
+    """Return the contour levels of `ground_map`, in Pa s or kPa, for use in further maps."""
     values = kind_of(quantity).factor * ground_values(result, quantity)
     return tuple(_contour_levels([_on_site(result, values)[2]]))
 
@@ -133,10 +128,6 @@ def ground_map(
             without the barrier, or with another layout.
         levels: Contour levels, which also set the scale, for comparisons of maps; see
             `map_levels`. By default they follow from the values drawn.
-
-    Raises:
-        BlastEnvError: If a blast was run without the recorders, or site or charge differ.
-        UnknownNameError: If there is no such quantity.
     """
     kind, results = kind_of(quantity), both_results(result, beside)
     values = [kind.factor * ground_values(result, quantity) for result in results]

@@ -99,7 +99,6 @@ def heat_map(result: BlastResult, among: Sequence[BlastResult] = ()) -> Figure:
     largest impulses.
 
     Args:
-        result: The blast.
         among: Results with the same colour scale, for comparisons of their maps.
     """
     chosen = _chosen(result)

@@ -79,7 +79,6 @@ def settled_labels(
         sizes: Width and height of each label.
         box: Returns the rectangle of a feature in the picture.
         room: Returns the rectangle inside a feature that its label may use, or None.
-        within: Rectangle for all labels.
         gap: Distance between a label and its feature.
         far: Distance beyond which a label has a leader.
         others: Further rectangles to avoid.

@@ -136,7 +136,6 @@ def last_frame(blast: Blast, outcome: str, remark: str, size_px: tuple[int, int]
     """Run a blast and return its end, uint8 (height, width, 3).
 
     Args:
-        blast: The blast.
         outcome: Its outcome in words.
         remark: Remark about the blast, after the scenario's name.
         size_px: Width and least height of the frame, as for `FramePainter`.

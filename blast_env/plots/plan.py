@@ -305,7 +305,6 @@ def site_features(
     """Return the features of a scenario with a layout, the lowest first.
 
     Args:
-        scenario: The scenario.
         layout: The layout of the build zone; it must fit there.
         charge: The charge, if known.
     """
@@ -371,7 +370,6 @@ def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -
     Parts on a terrace have its height as their `base_m`.
 
     Args:
-        features: The features.
         structures: Those of the site, terraces among them.
     """
     for feature in features:
@@ -414,7 +412,6 @@ def zone_features(
     """Return the build zone and every condition of it that has a place.
 
     Args:
-        zone: The build zone.
         structures_m: Rectangles of the structures, which the drawn access way avoids.
         barriers_m: Rectangles of the barriers, which it avoids where a straight way is left.
     """
@@ -741,7 +738,6 @@ def rectangles_of(
     Args:
         squares: Mask of the squares (rows, columns), the lowest row first.
         corner_m: Lower left corner of the grid.
-        side_m: Side of a square.
     """
     x_m, y_m = corner_m
     return [

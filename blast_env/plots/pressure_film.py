@@ -143,7 +143,6 @@ def record_planes(
     """Run a blast and record pictures of two planes.
 
     Args:
-        blast: The blast.
         section: The section; by default `default_section`.
         progress: Called from time to time with the elapsed share of the time limit.
         recorders: Further recorders, as for `GasBlast.run`.
@@ -198,11 +197,7 @@ def _planes_of(
     height_m: float,
     times_s: Sequence[float] = (),
 ) -> tuple[Snapshots, Snapshots]:
-    """Return recorders of a plan and a section.
-
-    Raises:
-        BlastEnvError: If a plane is outside the grid.
-    """
+    """Return recorders of a plan and a section."""
     place = [*site.site_m.centre, min(height_m, 0.5 * site.air_height_m)]
     place[section.normal] = section.at_m
     cell = grid.cell_at((place[0], place[1], place[2]))

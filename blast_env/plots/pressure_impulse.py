@@ -151,7 +151,6 @@ def level_bounds(
     """Return the largest impulse of a triangular load for which a component keeps each level.
 
     Args:
-        component: The component.
         peak_pa: Peaks of the loads (peaks,).
         impulses_pa_s: Range of impulses; a bound outside it is replaced by the nearer end.
 

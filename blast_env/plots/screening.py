@@ -34,11 +34,6 @@ def screening_picture(scenario: Scenario, layout: Layout, found: Screening) -> F
     """Return one plan per threat, with the stand-off of each level as a ring round the facades.
 
     Rings are for normal incidence and the components on the site. The star is the worst place.
-
-    Args:
-        scenario: The scenario.
-        layout: The layout.
-        found: Its screening.
     """
     count = len(found.threats)
     columns = min(count, 3)

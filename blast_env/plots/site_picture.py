@@ -46,10 +46,6 @@ def site_picture(scenario: AnyScenario, layout: Sequence[Element] = ()) -> Figur
 
     Args:
         scenario: The scenario, or its bundled name or path.
-        layout: The layout of the build zone.
-
-    Raises:
-        LayoutError: If the layout does not fit the build zone.
     """
     found = find_scenario(scenario)
     placement = LayoutState.of(found, layout)
@@ -68,7 +64,6 @@ def plan_figure(
     """Return a plan of a site with its scale, north, legend and names.
 
     Args:
-        scenario: The scenario.
         features: The features to draw and to name.
         handles: Further entries of the legend.
         heading: Title and subtitle.

@@ -95,7 +95,6 @@ def draw_features(axes: Axes, features: Iterable[Feature]) -> list[Artist]:
 
     Args:
         axes: The axes, in metres.
-        features: The features to draw.
 
     Returns:
         The artists drawn, the lowest first.
@@ -263,9 +262,7 @@ def draw_loads(
     """Draw modules in the colours of their loads; those that were not hit are white.
 
     Args:
-        axes: The axes.
         obstacle: The structure or barrier.
-        scale: The colour scale.
         linewidth: Width of the modules' edges, points.
         factor: Conversion from impulses to the unit of the scale.
 
@@ -419,8 +416,6 @@ def write_heading(
 
     Args:
         figure: The figure, with axes.
-        title: The title.
-        subtitle: The subtitle.
         share: Largest share of the width that they take.
         left: Whether they begin at the left border rather than stand in the middle.
     """

@@ -82,7 +82,6 @@ class RigidPiece:
         Args:
             length_m: Length, perpendicular to the force.
             thickness_m: Thickness, parallel to the force.
-            height_m: Height.
             mass_kg: Mass of the whole piece; that of solid concrete by default.
             base_width_m: Width of its base; its thickness by default.
             friction: Coefficient of friction with the ground; `FRICTION` by default.
@@ -152,7 +151,6 @@ def piece_responses(
     """Return the response of each piece to the difference of the pressures on its sides.
 
     Args:
-        pieces: The pieces.
         time_s: Times of the histories, ascending (times,).
         pressure_pa: Mean pressure on one side less that on the other (pieces, times).
 

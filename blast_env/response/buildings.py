@@ -53,7 +53,6 @@ def building_damage_probability(
     """Return the probability that a house has at least the given damage.
 
     Args:
-        damage: The damage.
         peak_pa: Side-on peak overpressures (places,).
         impulse_pa_s: Side-on impulses of the positive phase (places,).
     """

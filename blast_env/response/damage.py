@@ -29,7 +29,6 @@ def bay_damages(
     under the histories and under sharper ones of the same impulse.
 
     Args:
-        bays: The bays.
         time_s: Times of the histories, ascending (times,).
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
         peak_factor: Factor on peaks to make them as sharp as in the open; 1 without clipping.
@@ -106,7 +105,6 @@ def under_triangle(
     """Return the responses of one pane or panel to triangular loads without a rise time.
 
     Args:
-        part: The pane or panel.
         peak_pa: Peaks of the loads (loads,), or of one.
         impulse_pa_s: Impulses, which determine the durations.
     """

@@ -244,7 +244,6 @@ def peak_factor(cell_m: float, tnt_kg: float) -> float:
 
     Args:
         cell_m: Side of the cells.
-        tnt_kg: Mass of the charge.
     """
     return 1.0 + _CELLS_OF_HALF_A_PEAK * cell_m / cbrt(tnt_kg)
 
@@ -325,7 +324,6 @@ def respond(
     as long as the run lasts.
 
     Args:
-        bays: The bays.
         time_s: Times of the histories, ascending: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
 
@@ -377,7 +375,6 @@ class LoadDraws:
 
         Args:
             factor: Factor on the pressures, by which times are divided.
-            chosen: Numbers of the draws.
         """
         return LoadDraws(
             factor * self.peaks[chosen],
@@ -397,11 +394,9 @@ def drawn_levels(
     """Return the level of protection by a component of a bay in each draw (draws,).
 
     Args:
-        filled: The bay.
         is_window: Whether its windows count, or else its wall panel.
         time_s: Times of its history, ascending (times,).
         pressure_pa: Its history, inwards positive (times,).
-        draws: The draws.
     """
     history, loads = (time_s, pressure_pa), (draws.peaks, draws.durations)
     if is_window:

@@ -209,7 +209,6 @@ class Pane:
 
         Args:
             pressure_pa: Pressure on the pane; both panes of double glazing carry it.
-            duration_s: Its duration.
         """
         own = self.curve
         risk = np.interp(np.log(pressure_pa), np.log(own.load_pa), np.log(own.risk_60))
@@ -219,10 +218,6 @@ class Pane:
         """Return the pressure that breaks a share of panes, Pa (E1300's NFL times its factor).
 
         For double glazing, both panes carry the pressure, and the inner one breaks.
-
-        Args:
-            probability: Share of panes that break.
-            duration_s: Duration of the pressure.
         """
         own = self.curve
         shorter = (duration_s / _REFERENCE_S) ** (WEIBULL_M / STATIC_FATIGUE)
@@ -377,7 +372,6 @@ def glazing_responses(
     """Return the response of each pane to its history.
 
     Args:
-        panes: The panes.
         time_s: Times of the histories, ascending: (times,), or (panes, times) if they differ.
         pressure_pa: One history per pane, inwards positive (panes, times).
         limit_probability: Largest share of broken panes for the condition `NO_BREAK`.
@@ -434,7 +428,6 @@ def drawn_conditions(
     """Return the `GlazingCondition` of a pane in draws of its load and strength (draws,).
 
     Args:
-        pane: The pane.
         time_s: Times of its history, ascending (times,).
         pressure_pa: Its history, inwards positive (times,).
         draws: Factors on pressures, factors on times, and the share of panes that are weaker, above

@@ -143,11 +143,7 @@ class Responses:
 
 
 def check_histories(count: int, time_s: FloatArray, pressure_pa: FloatArray) -> None:
-    """Refuse pressures (count, times) of another shape.
-
-    Raises:
-        BlastEnvError: If there is not one history per component, with a value at each time.
-    """
+    """Refuse pressures (count, times) of another shape."""
     expected = (count, time_s.shape[-1])
     if pressure_pa.shape != expected:
         raise BlastEnvError(f"pressure_pa has shape {pressure_pa.shape}, must be {expected}")
@@ -162,7 +158,6 @@ def responses(
     """Return the response of each system to its history.
 
     Args:
-        systems: The systems.
         time_s: Times of the histories, ascending: (times,), or (systems, times) if they differ.
         pressure_pa: One history per system, inwards positive (systems, times).
         steps_per_period: Least number of steps in the shortest period of a system.
@@ -192,7 +187,6 @@ def drawn_responses(
     """Return the response of a system in draws of its load and strength.
 
     Args:
-        system: The system.
         time_s: Times of its history, ascending (times,).
         pressure_pa: Its history, inwards positive (times,).
         draws: Factors on pressures, on times, and on the resistance (draws,).
@@ -215,7 +209,6 @@ def _integrate(
     """Write the motion of a system to a row; see `blast_env.response.kernels.integrate`.
 
     Args:
-        system: The system.
         history: Times, pressures and impulses until them (times,).
         strength: Factor on its resistance.
         steps_per_period: Least number of steps in its shortest period.

@@ -223,7 +223,6 @@ def panel_responses(
     """Return the response of each panel to its history.
 
     Args:
-        panels: The panels.
         time_s: Times of the histories, ascending: (times,), or (panels, times) if they differ.
         pressure_pa: One history per panel, inwards positive (panels, times).
 

@@ -511,9 +511,6 @@ def cell_from(given: Any, place: str) -> Cell:
     Args:
         given: (row, column); NumPy numbers and arrays are accepted.
         place: Its place in the layout, for the error.
-
-    Raises:
-        LayoutError: If it has another form.
     """
     if type(given) is tuple and tuple(map(type, given)) == (int, int):
         return given  # the usual case

@@ -64,11 +64,7 @@ class BayComponents:
         return replace(self, glazing=glazing, wall=wall)
 
     def filled(self, known: Components) -> FacadeBay:
-        """Return it with its components.
-
-        Raises:
-            BlastEnvError: If the bay is empty, or smaller than a pane.
-        """
+        """Return it with its components."""
         window, glass, wall = (
             None if name is None else known[name] for name in (self.window, self.glazing, self.wall)
         )
@@ -162,7 +158,6 @@ def facade_problems(structures: Iterable[AnyStructure], own: Components) -> Iter
     """Yield the problems of the facades of a scenario without `bay_count_problems`.
 
     Args:
-        structures: The structures.
         own: The components that the scenario defines.
     """
     for index, structure in enumerate(structures):
@@ -191,9 +186,7 @@ def hardening_problems(
     """Yield the problems of the measures that harden facades.
 
     Args:
-        structures: The structures.
         own: The components that the scenario defines.
-        measures: The measures.
     """
     known = {**catalogue(), **own}
     names = [structure.name for structure in structures]

@@ -182,9 +182,6 @@ def footprint_of(outline_m: Ring, courtyards_m: tuple[Ring, ...] = ()) -> Footpr
     Args:
         outline_m: Corners of the outline, in either order.
         courtyards_m: Corners of the courtyards.
-
-    Raises:
-        BlastEnvError: If a ring crosses itself, or a courtyard does not lie inside the outline.
     """
     problem = footprint_problem(outline_m, courtyards_m)
     if problem:

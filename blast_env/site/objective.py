@@ -228,7 +228,6 @@ class ObjectiveSection(Section):
             impulse_pa_s: Its impulse per area.
             peak_pa: Its peak overpressure.
             weight: Weight of its impulse or its response.
-            peak_weight: Weight of its peak.
             response: Its response; `None` counts as 0, for a structure without a facade.
         """
         if self.is_response:

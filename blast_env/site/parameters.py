@@ -269,11 +269,7 @@ def with_resolution(parameters: SimulationParameters, factor: float) -> Simulati
 
 
 def softened_elasticity(of_kind: BallParameters, factor: float) -> float:
-    """Return the elasticity that reduces the loss of two balls of a kind to 1 / `factor`.
-
-    Raises:
-        BlastEnvError: If the loss would exceed 1, because `factor` is too small.
-    """
+    """Return the elasticity that reduces the loss of two balls of a kind to 1 / `factor`."""
     loss = 1.0 - of_kind.elasticity**2
     if loss > factor:
         raise BlastEnvError(

@@ -104,7 +104,6 @@ class FacadeSection(Section):
         """Return the facade with other components in all bays of a side.
 
         Args:
-            side: The side.
             names: Names of components by `glazing` or `wall`; `None`: that of the facade.
         """
         before = self.of_side(side)

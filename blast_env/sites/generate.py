@@ -37,7 +37,6 @@ def generate_site(
 
     Args:
         seed: 0 to 2^63 - 1.
-        ranges: Ranges of the site.
         criterion: Acceptance criterion; the family's default unless given.
 
     Raises:
@@ -69,8 +68,6 @@ def draw_site(rng: np.random.Generator, ranges: Ranges, name: str) -> Scenario:
 
     Args:
         rng: The random stream.
-        ranges: Ranges of the site.
-        name: Name of the site.
 
     Raises:
         ScenarioError: If the drawn objects are inconsistent, which does not happen with the

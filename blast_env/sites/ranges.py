@@ -201,10 +201,8 @@ def draw_place(
     """Draw the place of a rectangle, uniformly over the allowed places on the 0.5 m grid.
 
     Args:
-        draws: Draws.
         area: Area within which it must lie, m; its corner is on the grid.
         size_m: Width and height.
-        others: Obstacles.
 
     Returns:
         The rectangle, m; `None` if there is no allowed place.

@@ -85,7 +85,6 @@ class SiteSource:
 
         Args:
             count: Number of sites; small numbers serve to study generalisation.
-            ranges: Ranges of the sites.
 
         Raises:
             BlastEnvError: If the count is out of bounds.
@@ -98,7 +97,6 @@ class SiteSource:
 
         Args:
             count: Number of sites, at most 10,000.
-            ranges: Ranges of the sites.
 
         Raises:
             BlastEnvError: If the count is out of bounds.

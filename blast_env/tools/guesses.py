@@ -14,8 +14,6 @@ def guessed_shares(
     the barriers alone.
 
     Args:
-        problem: The problem.
-        surrogate: The surrogate.
         site: Its scenario as the surrogate represents it.
         layout: A legal layout.
     """

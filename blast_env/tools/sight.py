@@ -39,7 +39,6 @@ def look_at(problem: BenchmarkProblem, picture: bool, **more: Any) -> Look:
     """Return the site of a problem in words and numbers.
 
     Args:
-        problem: The problem.
         picture: Whether to add a picture of the plan.
         more: The other fields of the record.
 
@@ -101,11 +100,7 @@ def legality_of(problem: BenchmarkProblem, layout: Sequence[PlacedPiece]) -> dic
 
 
 def element_in(problem: BenchmarkProblem, piece: PlacedPiece) -> Element:
-    """Return the element of a piece, which need not be legal.
-
-    Raises:
-        BlastEnvError: If it names no item where there are items.
-    """
+    """Return the element of a piece, which need not be legal."""
     names = [item.item for item in _items(problem.scenario)]
     if names and not piece.item:
         raise BlastEnvError(

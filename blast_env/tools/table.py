@@ -123,8 +123,6 @@ def call_tool(
     Args:
         owner: The session, or else the owner of the tools.
         name: The tool's name.
-        arguments: Its arguments by name.
-        tools: The tools.
 
     Raises:
         UnknownNameError: If there is no such tool.

@@ -109,8 +109,6 @@ class Tasks:
         """Return the arguments of resets of a split, for trainers that want a list.
 
         Args:
-            split: The split.
-            count: Number of resets.
             budget: Most blasts of each.
             first: Index of the first; the others follow.
 

@@ -50,7 +50,6 @@ def keep_open(
     """Take away the places of some layouts that would close the way.
 
     Args:
-        indices: The layouts.
         passable: Cells that are free of structures (rows, columns).
         occupancy: See `LayoutBatch`.
         sizes: Rows and columns of each variant (variants, 2); 0 and 0 of a measure.

@@ -115,11 +115,7 @@ class CrashRating(Section):
 
 
 def _read_astm(found: re.Match[str]) -> dict[str, float | str]:
-    """Return the keys of a code of ASTM F2656.
-
-    Raises:
-        ValueError: If the standard has no such code.
-    """
+    """Return the keys of a code of ASTM F2656."""
     vehicle, speed, penetration = found.groups()
     speeds = [
         speed_km_h for speed_km_h in _ASTM_KM_H if speed_km_h != "60" or vehicle in _ASTM_CARS
@@ -138,11 +134,7 @@ def _read_astm(found: re.Match[str]) -> dict[str, float | str]:
 
 
 def _read_vehicle(found: re.Match[str]) -> dict[str, float | str]:
-    """Return the keys of a code of ISO 22343-1, IWA 14-1 or PAS 68.
-
-    Raises:
-        ValueError: If its angle is not that of an impact.
-    """
+    """Return the keys of a code of ISO 22343-1, IWA 14-1 or PAS 68."""
     degrees = float(found["degrees"])
     if not 0.0 < degrees <= 90.0:
         raise ValueError(f"whose angle is {degrees:g} degrees, must be above 0, at most 90")

@@ -296,7 +296,6 @@ def _too_slow(
     """Return the pieces with impact speeds above those of their crash ratings.
 
     Args:
-        pieces: The pieces.
         speeds: Speeds of the vehicle.
         among: Places from which it may hit them (rows, columns); the open ones unless given.
     """
@@ -371,7 +370,6 @@ def _weak_on(
     Args:
         ground: The vehicle with its surroundings.
         bits: The open places, packed.
-        pieces: The pieces.
     """
     # Fewer arcs give speeds from below: what breaks by them breaks.
     if _too_slow(pieces, _speeds_on(ground, bits, _FEW_ARCS)) == pieces:

@@ -44,7 +44,6 @@ def spread(
         lengths: Their lengths (directions,).
         of: As in `Arcs`.
         ends: As in `Arcs`.
-        arc_lengths: Lengths of the arcs.
         first: As in `Arcs`.
         points: As in `Arcs`.
         arc_most: The largest label on each arc.
@@ -146,7 +145,6 @@ def fastest_into(
         among: Places to examine (rows, columns).
         box: First row and the one after the last, then the same for columns, of the search.
         steps_m: Steps of the directions (directions, 2).
-        lengths_m: Their lengths.
         sides_m: Left, bottom, right and top of the rectangle, grown by half of the vehicle's width.
         place_m: Spacing of places.
         slack_m: Largest depth inside the rectangle at which a place counts as outside.

@@ -55,7 +55,6 @@ def worst_of(source: Vehicle, places_m: FloatArray, walls: Sequence[Wall]) -> Wo
     """Return the worst of some places.
 
     Args:
-        source: The vehicle.
         places_m: Possible places of its charge, at least one (places, 2).
         walls: The loaded walls of protected structures.
     """
@@ -99,9 +98,7 @@ class PlainGround:
         """Return the same of loaded walls, or `None` unless all are parallel to the site's sides.
 
         Args:
-            source: The vehicle.
             query: Its reach on the empty site.
-            walls: The loaded walls.
         """
         if not walls or any(isinstance(wall, WallLine) for wall in walls):
             return None

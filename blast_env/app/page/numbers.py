@@ -53,11 +53,7 @@ class NumberField(ui.input):
 
     @property
     def number(self) -> float | None:
-        """The number in the field; `None` if it is empty.
-
-        Raises:
-            BlastEnvError: If its text is no number, or one out of bounds.
-        """
+        """The number in the field; `None` if it is empty."""
         text = (self.value or "").strip()
         if not text:
             if self._optional:
@@ -74,11 +70,7 @@ class NumberField(ui.input):
 
     @property
     def filled(self) -> float:
-        """The number of a field that must not be empty.
-
-        Raises:
-            BlastEnvError: As `number`.
-        """
+        """The number of a field that must not be empty."""
         number = self.number
         assert number is not None
         return number

@@ -41,7 +41,6 @@ async def read_upload(
 
     Args:
         workers: The processes; they limit the files read at the same time.
-        file: The file.
         read: Reads it, from a path; it, its arguments and its result must pickle.
         arguments: Further arguments.
 
@@ -80,7 +79,6 @@ def site_upload(label: str, workers: Workers, use: Callable[[Scenario, str], Non
     """Make an upload field for the file of a site.
 
     Args:
-        label: Its label.
         workers: The processes, of which one reads it.
         use: Takes the site, and the name of the file.
     """
@@ -104,9 +102,7 @@ def file_upload(
     """Make an upload field for a file.
 
     Args:
-        label: Its label.
         endings: Suffixes of the files on offer.
-        take: Takes the file.
     """
 
     async def received(event: events.UploadEventArguments) -> None:
@@ -169,11 +165,7 @@ class ImportDialog:
                 ui.button("cancel", on_click=self._dialog.close).props("flat no-caps")
 
     def _options(self) -> ImportOptions:
-        """Return the options entered.
-
-        Raises:
-            BlastEnvError: If a value is out of bounds, or no place.
-        """
+        """Return the options entered."""
         return ImportOptions(
             centre=next(iter(_places(_filled(self._centre))), None),
             size_m=next(iter(_places(_filled(self._size))), None),
@@ -276,11 +268,7 @@ def _filled(element: Any) -> str:
 
 
 def _places(text: str) -> list[tuple[float, float]]:
-    """Return the places in a text, `x, y; x, y`.
-
-    Raises:
-        BlastEnvError: If a part is no place.
-    """
+    """Return the places in a text, `x, y; x, y`."""
     places = []
     for part in filter(None, (own.strip() for own in text.split(";"))):
         try:

@@ -124,11 +124,8 @@ def most_blasts(
     All kinds begin without a barrier, and those that place none have no other.
 
     Args:
-        scenario: The scenario.
-        kinds: The kinds.
         rounds: Largest number of searches for each.
         budget: Largest number of blasts of a search.
-        threats: Number of threats.
     """
     searches = rounds * sum(bool(_items_of(scenario, kind)) for kind in kinds)
     return threats + searches * (budget - threats), 1 + searches
@@ -181,7 +178,6 @@ def advise(
 
     Args:
         problem: Problem of a scenario whose objective has a target.
-        kind: The kind.
         budget: Largest number of blasts.
         seed: Seed of all random draws.
         begin_with: Initial layouts, for example of other kinds.
@@ -257,9 +253,7 @@ def advise_until(
     Each search after the first requires a margin to the damage of the layout that the judge failed.
 
     Args:
-        judge: Returns the verdict on a layout.
         problem: As for `advise`.
-        kind: The kind.
         budget: Largest number of blasts per search.
         seed: Seed of all random draws.
         begin_with: Initial layouts.

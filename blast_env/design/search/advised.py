@@ -44,13 +44,9 @@ def site_with_target(
     """Return the scenario with the requested target and budget.
 
     Args:
-        scenario: The scenario.
         level: The required level.
         target_probability: Least probability of it; `None` for the scenario's.
         budget_cost: The most that may be spent; `None` for the scenario's.
-
-    Raises:
-        ScenarioError: If one of them is out of bounds, or no protected structure has a facade.
     """
     kept = scenario.objective.model_dump(
         include={"charges", "cvar_level", "measure", "target_probability"}, exclude_none=True

@@ -33,7 +33,6 @@ def search_figure(result: SearchResult, problem: DesignProblem) -> Figure:
 
     Args:
         result: The result of the search, which has spent blasts.
-        problem: The problem of the search.
     """
     panels = 2 if result.front else 1
     figure = Figure(figsize=(2.0 + 5.6 * panels, 5.4), layout="constrained")

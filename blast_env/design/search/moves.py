@@ -26,7 +26,6 @@ def legal_part(scenario: Scenario, layout: Sequence[Element]) -> LayoutState:
     """Return the placement of a layout, in its order, without its illegal elements.
 
     Args:
-        scenario: The scenario.
         layout: Modules or pieces; those on cells outside the zone are illegal.
     """
     with suppress(LayoutError):

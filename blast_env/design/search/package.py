@@ -47,10 +47,8 @@ class PackageProposer:
         See `proposed`.
 
         Args:
-            problem: The problem.
             budget: Most blasts, none of which is spent.
             seed: Seed of all random draws.
-            report: Called with the progress.
         """
         # Imported here because the import takes half a second.
         from blast_env.design.search.learnt import search_by
@@ -68,8 +66,6 @@ def proposed(problem: DesignProblem, layout: Layout, by: str) -> SearchResult:
     predicted gain is below `LEAST_GAIN`.
 
     Args:
-        problem: The problem.
-        layout: The layout.
         by: What it is from, in words.
     """
     guesses, charge = _guesses(problem), problem.known_charge
@@ -120,11 +116,6 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     A rule's layout with a better prediction replaces the layout. Each piece that reduces the load
     by less than `LEAST_PIECE_GAIN` is then removed, the least useful first, as long as the rest is
     not worse than the best rule's layout and gains `LEAST_GAIN`.
-
-    Args:
-        guesses: Predicted loads of layouts.
-        layout: The layout.
-        rules: The layouts of the rules.
     """
 
     def load(layout: Layout) -> float:

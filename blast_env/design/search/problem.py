@@ -163,7 +163,6 @@ class Proposer(Protocol):
             problem: The problem to minimise. `problem.load` and `problem.loads` run blasts.
             budget: Largest number of blasts; see `SearchResult.blasts`.
             seed: Seed of all random draws.
-            report: Called with the progress.
 
         Raises:
             BlastEnvError: If the proposer is not applicable to the budget or the site.
@@ -177,7 +176,6 @@ class LayoutAgent(Protocol):
         """Return a layout that satisfies all conditions of the build zone; it is deterministic.
 
         Args:
-            scenario: The scenario; it has a build zone.
             charge: The charge, if it is known; otherwise the layout is for all charges of the
                 scenario.
         """

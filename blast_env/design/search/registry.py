@@ -57,23 +57,14 @@ def proposers(*kinds: ProposerKind, suiting: Iterable[Scenario] = ()) -> Mapping
 
 
 def proposer_row(name: str) -> ProposerRow:
-    """Return the description of a proposer.
-
-    Raises:
-        UnknownNameError: If no proposer has that name; the message suggests the nearest one.
-    """
+    """Return the description of a proposer."""
     if name not in _TABLE:
         raise UnknownNameError("search method", name, _TABLE)
     return _TABLE[name]
 
 
 def check_suits(name: str, scenario: Scenario) -> None:
-    """Check that a site has the properties that a proposer requires.
-
-    Raises:
-        BlastEnvError: If a property is missing.
-        UnknownNameError: As for `proposer_row`.
-    """
+    """Check that a site has the properties that a proposer requires."""
     for need in proposer_row(name).needs:
         if not need.is_met(scenario):
             raise BlastEnvError(f"{scenario.name} has no {need.value}: {name} is of no use there")
@@ -107,7 +98,6 @@ def widened(proposer: Proposer, width: int) -> Proposer:
     """Return a proposer that keeps more workers busy, if it is a search with a width.
 
     Args:
-        proposer: The proposer.
         width: Number of blasts that can run at the same time; the result depends on it.
     """
     if not _has_field(proposer, "width"):

@@ -193,7 +193,6 @@ def bay_rows(
     """Return the response of bays, one row each, with the keys of `LOADED_BAY_COLUMNS`.
 
     Args:
-        found: The response.
         known: Whether the loads are known, by bay.
         validations: The validation status of each load.
     """

@@ -297,7 +297,6 @@ def default_engine(use: str, *scenarios: Scenario) -> str:
 
     Args:
         use: The id of an environment, or a command.
-        scenarios: The sites.
     """
     # A site that states heights means them.
     if any(scenario.height_notes for scenario in scenarios):

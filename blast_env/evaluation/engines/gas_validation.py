@@ -112,7 +112,6 @@ def bay_validations(
 
     Args:
         site: The site with its charge, structures and barrier.
-        bays: The bays.
         cells: Cells per m/kg^(1/3) of the charge.
         known: Whether the loads on bays are known, by bay; those that are not named are.
     """

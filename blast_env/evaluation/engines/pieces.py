@@ -68,9 +68,6 @@ def rigid_piece(zone: BuildZone, element: Element) -> RigidPiece | None:
     """Return a piece or a module as a rigid body.
 
     It is `None` for a module as high as the air, and for a measure.
-
-    Raises:
-        LayoutError: If there is no such item, or it cannot be turned.
     """
     variant = zone.catalogue.variant(element)
     if not variant.height_m:

@@ -57,10 +57,6 @@ class Edge:
 def mass_near(judged: Consequences, level: LevelOfProtection) -> tuple[float, bool]:
     """Return the largest mass near that of a charge that keeps a level, kg, without a blast.
 
-    Args:
-        judged: The consequences of the charge.
-        level: The level.
-
     Returns:
         The mass, and whether it is within the range of scaled histories; else it is an end of that
         range: the largest mass examined if the level is kept, or the least one if it is not.
@@ -222,12 +218,8 @@ def capacity(
 
     Args:
         evaluator: Its scenario, its engine, and its store of blasts.
-        layouts: The layouts by name.
         charges: The charges; their places count.
         progress: Called with the finished share of the places.
-
-    Raises:
-        BlastEnvError: If no structure has a facade, or the engine records no bays.
     """
     check_facades(evaluator.scenario, evaluator.engine)
     found = []

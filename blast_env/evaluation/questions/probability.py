@@ -135,11 +135,7 @@ class Uncertainty:
         return cls(mass=mass, cells=0.0 if isnan(share) else share)
 
     def __post_init__(self) -> None:
-        """Check the shares.
-
-        Raises:
-            BlastEnvError: If one is negative, or that of the mass is above 0.3.
-        """
+        """Check the shares."""
         for name, value in vars(self).items():
             if not 0.0 <= value < np.inf:
                 raise BlastEnvError(f"{name} is {value}, must be at least 0")
@@ -218,9 +214,6 @@ def level_probability(
 
     `deciding` is the number of bays of each component that are drawn, by damage, by peak and by
     impulse.
-
-    Raises:
-        BlastEnvError: If there are no buildings with a facade, or there is no draw or deciding bay.
     """
     draws = whole_number("draws", draws, 1, _MOST_DRAWS)
     deciding = whole_number("deciding", deciding, 1, _MOST_DRAWS)

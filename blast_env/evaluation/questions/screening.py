@@ -264,9 +264,6 @@ def screen(
     laws of an atlas (`blast_env.atlas.laws`); without one, pieces cut lines of sight, but do not
     shield. Given threats may go off at every place of the site's charges, in the place of
     these.
-
-    Raises:
-        BlastEnvError: If no structure has a facade, or two threats have the same name.
     """
     named = [*threats]
     # (1) The sources of each threat; (2) its places, of vehicles as far as the layout lets them;

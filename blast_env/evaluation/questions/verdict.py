@@ -490,11 +490,7 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
 
 
 def check_facades(scenario: Scenario, engine: Engine) -> None:
-    """Refuse, before any blast, a site without a facade or an engine that records no bays.
-
-    Raises:
-        BlastEnvError: If one of them is the case.
-    """
+    """Refuse, before any blast, a site without a facade or an engine that records no bays."""
     if not scenario.bays:
         raise BlastEnvError(
             f"scenario {scenario.name!r}: no structure has a facade with bays: add "
@@ -511,9 +507,6 @@ def consequences_of(blasts: Blasts, name: str | None = None) -> Consequences:
 
     They are those with the layout in question, unless another one is named. The present panes and
     walls stand in the bays, with the measures of the layout.
-
-    Raises:
-        BlastEnvError: If the engine records no bays, or a record is that of other bays.
     """
     name = name or blasts.judged
     numbers = range(len(blasts.threats))

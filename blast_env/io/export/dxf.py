@@ -163,7 +163,6 @@ def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
     """Return all texts on the site.
 
     Args:
-        plan: The layout on its site.
         height_m: Height of the letters; names inside things are smaller if they must fit.
     """
     inside = [
@@ -279,11 +278,7 @@ def drawing(plan: LayoutPlan) -> Drawing:
 
 
 def write_dxf(plan: LayoutPlan, path: Path) -> None:
-    """Write the drawing.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
+    """Write the drawing."""
     with write_atomically(path) as temporary:
         drawing(plan).saveas(temporary)
 

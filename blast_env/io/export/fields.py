@@ -47,10 +47,6 @@ def write_field(result: GasResult, path: Path) -> None:
 
     Args:
         result: A blast that was run with `field_recorders`.
-        path: The file.
-
-    Raises:
-        BlastEnvError: If it was run without the recorders, or the file cannot be written.
     """
     maps = [recorder for recorder in result.run.solver.recorders if isinstance(recorder, FieldMap)]
     if not maps:
@@ -157,9 +153,6 @@ def write_series(result: GasResult, path: Path) -> None:
     Args:
         result: A blast that was run with `series_recorders`.
         path: The collection (.pvd).
-
-    Raises:
-        BlastEnvError: If it was run without the recorders, or a file cannot be written.
     """
     found = [own for own in result.run.solver.recorders if isinstance(own, FieldSeries)]
     if not found:

@@ -62,11 +62,7 @@ def _coordinate_words(georeference: AnyGeoreference | None) -> str:
 
 
 def write_geojson(plan: LayoutPlan, path: Path) -> None:
-    """Write the collection, one feature per line.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
+    """Write the collection, one feature per line."""
     collection = feature_collection(plan)
     features = ",\n".join(
         json.dumps(feature, allow_nan=False) for feature in collection["features"]

@@ -53,12 +53,7 @@ def write_glb(meshes: Sequence[Mesh], path: Path, name: str, extras: Mapping[str
 
     Args:
         meshes: The meshes; those without a triangle are left out.
-        path: The file.
-        name: Name of the scene.
         extras: What programs may read of the scene.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
     """
     # glTF 2.0: a header, a chunk of JSON and a chunk of numbers (Khronos, section 4, GLB).
     shown = [mesh for mesh in meshes if len(mesh.triangles_m)]

@@ -36,9 +36,6 @@ def write_ifc(plan: LayoutPlan, path: Path) -> None:
     `IfcBuildingElementProxy`.
 
     Lengths are in metres, from the lower left corner of the site, z upwards.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
     """
     model = _Model(plan)
     model.add()

@@ -30,11 +30,7 @@ _AXES: Final = "glTF: x is the site's x, y is height, z is minus the site's y; m
 
 
 def write_layout_scene(plan: LayoutPlan, path: Path) -> None:
-    """Write a layout on its site as glTF: ground, structures and the pieces of the barrier.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
+    """Write a layout on its site as glTF: ground, structures and the pieces of the barrier."""
     meshes = [*_site(plan.scenario, plan.layout), *_charge(plan.charge)]
     write_glb(meshes, path, plan.scenario.name, {"axes": _AXES})
 
@@ -44,9 +40,6 @@ def write_blast_scene(result: "GasResult", path: Path) -> None:
 
     The colours of loads are those of the legend of pictures, by the peak specific impulse of each
     bay, or of each face of a cell where a structure has no bays.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
     """
     scenario, site = result.blast.scenario, result.run.site
     loads = [*_bay_loads(result), *_face_loads(result)]

@@ -127,7 +127,6 @@ class Faces:
         Args:
             ground_m: Height of the ground.
             feet: Walls, posts and other areas or lines in plan that stand on the ground.
-            least_m2: Least area of a part.
             least_height_m: Least height of its top above the ground.
         """
         inside = enclosed(feet)

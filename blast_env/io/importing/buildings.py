@@ -68,11 +68,7 @@ _HIGH: Final = "too high is on the unsafe side for a building that shields: comp
 
 
 def prepared(site: SitePlacement) -> SitePlacement:
-    """Return a site whose buildings have sound outlines and heights, and do not overlap.
-
-    Raises:
-        BlastEnvError: If an outline is not sound, and may not be or cannot be repaired.
-    """
+    """Return a site whose buildings have sound outlines and heights, and do not overlap."""
     others = [thing for thing in site.things if thing.role is not Role.BUILDING]
     buildings = [_sound(site, thing) for thing in site.of_role(Role.BUILDING)]
     buildings = without_doubles(buildings, site.ledger)
@@ -82,11 +78,7 @@ def prepared(site: SitePlacement) -> SitePlacement:
 
 
 def _sound(site: SitePlacement, thing: Thing) -> Thing:
-    """Return a building with its outline without self-intersections; a point becomes a circle.
-
-    Raises:
-        BlastEnvError: If `repair` is off, or it crosses itself too often.
-    """
+    """Return a building with its outline without self-intersections; a point becomes a circle."""
     if thing.diameter_m is not None:
         radius_m = 0.5 * thing.diameter_m
         circle = shapely.buffer(thing.geometry, radius_m, quad_segs=_QUARTER_SIDES)

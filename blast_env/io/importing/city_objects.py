@@ -108,11 +108,7 @@ def city_objects(path: Path, documents: Sequence[Mapping[str, Any]]) -> dict[str
     """Return the objects of a city model by their ids.
 
     Args:
-        path: The file.
         documents: A CityJSON object, and the `CityJSONFeature`s that follow it.
-
-    Raises:
-        BlastEnvError: If it is of another version, or not as the format demands.
     """
     head = documents[0]
     version = head.get("version")
@@ -208,11 +204,7 @@ def _geometry(
     vertices: FloatArray,
     templates: tuple[list[Any], FloatArray] | None,
 ) -> CityGeometry:
-    """Return a geometry, of a template where its instance has it.
-
-    Raises:
-        BlastEnvError: If it is not as the format demands.
-    """
+    """Return a geometry, of a template where its instance has it."""
     kind = geometry.get("type") if isinstance(geometry, dict) else None
     # 1. A template, with its vertices where the instance puts it.
     if kind == _INSTANCE:

@@ -55,9 +55,6 @@ def read_cityjson(site_map: SiteMap, documents: Sequence[Mapping[str, Any]]) -> 
 
     Of several levels of detail, the highest below 3 is read. The ground under a building is its
     `GroundSurface`. Roads and squares are places of charges.
-
-    Raises:
-        BlastEnvError: If it is not as the format demands, or has no reference system.
     """
     path, options = site_map.path, site_map.options
     options.refuse("CityJSON, whose coordinates --crs is about", "units")

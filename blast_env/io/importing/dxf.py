@@ -87,9 +87,6 @@ def read_dxf(site_map: SiteMap) -> None:
 
     The unit is that of the options, one of `UNITS_M`, or that of the file. A drawing in metres may
     have a reference system.
-
-    Raises:
-        BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
     """
     path, options = site_map.path, site_map.options
     options.refuse("a drawing, whose heights are in --units", "height_unit")
@@ -149,12 +146,7 @@ def _set_scales(site_map: SiteMap, document: Drawing) -> None:
 
 
 def _check_entities(path: Path, document: Drawing) -> None:
-    """Refuse a drawing with too many entities or a number out of bounds, before it is expanded.
-
-    Raises:
-        BlastEnvError: If there are more than `MOST_ENTITIES` entities once all blocks are expanded,
-            a number is beyond `MOST_COORDINATE`, or a block is nested too deeply or in itself.
-    """
+    """Refuse a drawing with too many entities or a number out of bounds, before it is expanded."""
     counts: dict[str, int] = {}  # of blocks, by their names in lower case
 
     def count(entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
@@ -443,11 +435,7 @@ class _Drawn:
                 self.site_map.ledger.add(Fate.MERGED, kind, place, detail=detail)
 
     def _places(self, line: DrawnPath, place: str) -> FloatArray:
-        """Return the points of a line (n, 3), arcs as chords.
-
-        Raises:
-            BlastEnvError: If there are too many, or a coordinate is too large.
-        """
+        """Return the points of a line (n, 3), arcs as chords."""
         held = np.array([tuple(point) for point in line.control_vertices()]).reshape(-1, 3)
         self._check(held, place)
         largest = float(np.abs(held).max(initial=0.0))

@@ -155,12 +155,7 @@ class BuildingFit:
 
 
 def fit_buildings(site: SitePlacement) -> tuple[BuildingFit, ...]:
-    """Return the buildings of a site as polygons, with those protected that are to be.
-
-    Raises:
-        BlastEnvError: If there is no building, there are too many, one that is to be protected is
-            not on the site, or none is protected.
-    """
+    """Return the buildings of a site as polygons, with those protected that are to be."""
     kept = _kept(site)
     if not kept:
         raise _no_building(site)
@@ -222,11 +217,7 @@ def _fitted(
 
 
 def _kept(site: SitePlacement) -> list[Thing]:
-    """Return the large enough buildings on the site, cut at its border.
-
-    Raises:
-        BlastEnvError: If there are too many buildings, or their outlines are too long.
-    """
+    """Return the large enough buildings on the site, cut at its border."""
     least_m2 = site.options.least_area_m2
     outlines = np.array([thing.geometry for thing in site.of_role(Role.BUILDING)], dtype=object)
     outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
@@ -362,10 +353,6 @@ def _with_protected(
     """Return the buildings, with those protected that the user named, or else the file marks.
 
     All parts of a building are protected with it.
-
-    Raises:
-        BlastEnvError: If there is no building of a name, the place is outside the site, the
-            building asked for is left out, or no building is protected.
     """
     chosen = {_named(site, buildings, name) for name in site.options.protect}
     if site.options.protect_near is not None:

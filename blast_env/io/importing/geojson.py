@@ -29,9 +29,6 @@ def read_geojson(site_map: SiteMap, document: Mapping[str, Any]) -> None:
     Its coordinates are in the reference system of the options, `local` for metres without a place
     on the Earth; that of the file unless given, or longitude and latitude (EPSG:4326) if it has
     none.
-
-    Raises:
-        BlastEnvError: If it is not GeoJSON.
     """
     path, options = site_map.path, site_map.options
     options.refuse("GeoJSON, whose coordinates --crs is about", "units")

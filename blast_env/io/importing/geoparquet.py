@@ -34,9 +34,6 @@ def read_geoparquet(site_map: SiteMap) -> None:
 
     Its coordinates are in the reference system of the options, else in that of the file, which is
     longitude and latitude unless it says another.
-
-    Raises:
-        BlastEnvError: If it cannot be read, or is Parquet without geometries in WKB.
     """
     path = site_map.path
     site_map.options.refuse("GeoParquet, whose coordinates --crs is about", "units")

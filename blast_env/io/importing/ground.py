@@ -63,14 +63,6 @@ def charge_sources(
     Streets become segments along both kerbs, weighted by length, so that every metre is equally
     likely; areas become rectangles weighted by area; points remain points with the weight of 5 m
     of street. All keep clear of buildings and border by the charge's radius.
-
-    Args:
-        site: The site.
-        buildings: Its buildings.
-        radius_m: Radius of the charge, m.
-
-    Raises:
-        BlastEnvError: If there is no place for a charge, or there are too many.
     """
     free = _free(site, buildings, radius_m)
     # 1. Places asked for, and the mouths of passages; 2. streets and areas, in coarser lines until
@@ -210,9 +202,6 @@ def build_zone(site: SitePlacement, buildings: Sequence[BuildingFit]) -> dict[st
     """Return the build zone in the form of a scenario; `None` if neither map nor options have one.
 
     A zone that is not a rectangle becomes its bounding box, with no-build areas for the rest.
-
-    Raises:
-        BlastEnvError: If it is not on the site, or takes too many no-build areas.
     """
     options = site.options
     inside = np.zeros(site.shape, dtype=bool)
@@ -283,12 +272,7 @@ def _keep_outs(
 
 
 def _on_site(site: SitePlacement, role: Role) -> list[Thing]:
-    """Return the objects of a role, areas with sound outlines that are cut at the border.
-
-    Raises:
-        BlastEnvError: If there are too many areas, or too long ones, or one crosses itself too
-            often.
-    """
+    """Return the objects of a role, areas with sound outlines that are cut at the border."""
     things, areas = [], []
     for thing in site.of_role(role):
         if shapely.get_dimensions(thing.geometry) == 2:
@@ -306,11 +290,7 @@ def _on_site(site: SitePlacement, role: Role) -> list[Thing]:
 
 
 def _window(site: SitePlacement, area_m: Rectangle, option: str) -> tuple[slice, slice]:
-    """Return the rows and columns of a rectangle, which must lie on the site.
-
-    Raises:
-        BlastEnvError: If it does not.
-    """
+    """Return the rows and columns of a rectangle, which must lie on the site."""
     width_m, height_m = site.size_m
     if not Rectangle(0.0, 0.0, width_m, height_m).contains(area_m) or not (
         area_m.left < area_m.right and area_m.bottom < area_m.top

@@ -50,11 +50,7 @@ class HeightReader:
 
     @classmethod
     def of(cls, site_map: SiteMap) -> "HeightReader":
-        """Return the reader of a map: in the unit of the options, else feet if its system is.
-
-        Raises:
-            BlastEnvError: If its reference system is unknown.
-        """
+        """Return the reader of a map: in the unit of the options, else feet if its system is."""
         asked, crs = site_map.options.height_unit, site_map.crs
         if asked is not None:
             return cls(site_map, UNITS_M[asked])

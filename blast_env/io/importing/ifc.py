@@ -58,9 +58,6 @@ def read_ifc(site_map: SiteMap) -> None:
 
     A building is what its walls, slabs and roofs cover, in parts of different heights. Walls of
     the site stand for themselves. Everything else is on the ledger.
-
-    Raises:
-        BlastEnvError: If the file cannot be read, states no unit of length, or has no building.
     """
     path, options = site_map.path, site_map.options
     options.refuse("IFC, which states its unit", "units", "height_unit")

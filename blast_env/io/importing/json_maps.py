@@ -12,11 +12,7 @@ from blast_env.io.importing.site_map import MOST_VALUES, SiteMap, check_count
 
 
 def read_json(site_map: SiteMap) -> None:
-    """Read a file of GeoJSON or CityJSON into a map.
-
-    Raises:
-        BlastEnvError: If it cannot be read, or is neither.
-    """
+    """Read a file of GeoJSON or CityJSON into a map."""
     document = _parsed(site_map.path, site_map.content)
     if document.get("type") == "CityJSON":
         read_cityjson(site_map, [document])
@@ -25,21 +21,13 @@ def read_json(site_map: SiteMap) -> None:
 
 
 def read_json_lines(site_map: SiteMap) -> None:
-    """Read a text sequence of a CityJSON object and its features into a map.
-
-    Raises:
-        BlastEnvError: If it cannot be read.
-    """
+    """Read a text sequence of a CityJSON object and its features into a map."""
     _check_values(site_map.path, site_map.content)
     read_cityjson(site_map, _lines(site_map.path, site_map.content))
 
 
 def _check_values(path: Path, content: bytes) -> None:
-    """Refuse a document with more than `MOST_VALUES` values.
-
-    Raises:
-        BlastEnvError: If it has more.
-    """
+    """Refuse a document with more than `MOST_VALUES` values."""
     values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
     check_count(path, values, MOST_VALUES, "commas and opening brackets")
 
@@ -60,11 +48,7 @@ def _parsed(path: Path, content: bytes) -> Mapping[str, Any]:
 
 
 def _lines(path: Path, content: bytes) -> list[Any]:
-    """Return the JSON documents of a text sequence, one a line.
-
-    Raises:
-        BlastEnvError: If a line is not JSON.
-    """
+    """Return the JSON documents of a text sequence, one a line."""
     documents: list[Any] = []
     for number, line in enumerate(content.splitlines()):
         if not line.strip():

@@ -44,10 +44,6 @@ def read_layers(site_map: SiteMap) -> None:
 
     Its coordinates are in the reference system of the options, `local` for metres without a place
     on the Earth; that of the layers unless given.
-
-    Raises:
-        BlastEnvError: If it cannot be read, its layers have several reference systems or none, or
-            pyogrio is not installed.
     """
     site_map.options.refuse("geographic data, whose coordinates --crs is about", "units")
     path, systems = site_map.path, dict[str, str | None]()

@@ -67,9 +67,6 @@ def read_osm(site_map: SiteMap) -> None:
 
     Closed ways without `highway` and multipolygon relations are outlines. Objects that JOSM has
     marked as deleted are not read.
-
-    Raises:
-        BlastEnvError: If it cannot be read, or options do not fit.
     """
     options, path = site_map.options, site_map.path
     options.refuse("OpenStreetMap, which is in longitude and latitude", "units", "crs")
@@ -82,11 +79,7 @@ def read_osm(site_map: SiteMap) -> None:
 
 @contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    """Yield the path of the unpacked file; the file itself if it is not packed.
-
-    Raises:
-        BlastEnvError: If it cannot be unpacked, or would be too large.
-    """
+    """Yield the path of the unpacked file; the file itself if it is not packed."""
     opened = next((way for end, way in _PACKED.items() if path.name.lower().endswith(end)), None)
     if opened is None:
         yield path

@@ -34,9 +34,6 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
     Args:
         outlines: Valid outlines on the site, m.
         what: Description of the outlines, for the error.
-
-    Raises:
-        BlastEnvError: If they are too long, or their bounding boxes have too many cells.
     """
     starts, ends = _edges_of(outlines)
     crossed = float(np.abs(ends - starts).sum()) / MODULE_SIDE_M
@@ -61,11 +58,7 @@ def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
     courtyards is not, nor is the rest of a courtyard that sticks out.
 
     Args:
-        outline: Any outline.
         what: Description of the outline, for the error.
-
-    Raises:
-        BlastEnvError: If it crosses itself more than `MOST_CROSSINGS` times.
     """
     if shapely.is_valid(outline):
         return outline

@@ -30,7 +30,6 @@ def fitted(
     Args:
         facade: Storeys and windows, see `MapFeature`; may be empty.
         walls_m: Lengths of the walls.
-        rise_m: Height of the walls.
         place: The building's place in the file.
         ledger: The ledger of the import.
     """

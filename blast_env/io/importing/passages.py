@@ -33,8 +33,6 @@ def mouths_of(site: SitePlacement, buildings: Sequence[BuildingFit], free: BaseG
     The ledger gets the streets.
 
     Args:
-        site: The site.
-        buildings: Its buildings.
         free: The area of possible centres of a charge.
     """
     outlines = np.array([building.outline for building in buildings], dtype=object)

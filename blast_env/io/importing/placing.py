@@ -111,10 +111,6 @@ def place_site(site_map: SiteMap, things: Sequence[Thing]) -> SitePlacement:
 
     Lines that close become outlines. The ledger gets the objects that are elsewhere or cannot be
     used.
-
-    Raises:
-        BlastEnvError: If the map has no objects, the place is not on the Earth, or the site would
-            be too large.
     """
     options, ledger = site_map.options, site_map.ledger
     faulty = [thing for thing in things if thing.fault]
@@ -251,11 +247,7 @@ def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
 def _grid(
     site_map: SiteMap, things: Sequence[Thing], plane: Plane, rotation_deg: float
 ) -> tuple[tuple[float, float], tuple[int, int]]:
-    """Return the site's corner in the turned plane, and its rows and columns of modules.
-
-    Raises:
-        BlastEnvError: If the site would be too large.
-    """
+    """Return the site's corner in the turned plane, and its rows and columns of modules."""
     options = site_map.options
     left, bottom, right, top = _bounds_m(site_map, things, plane, rotation_deg)
     size_m = right - left, top - bottom

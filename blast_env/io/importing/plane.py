@@ -139,9 +139,6 @@ def plane_around(crs: str | None, unit_m: float, place: tuple[float, float]) -> 
         crs: Reference system of the map; `None` for a drawing.
         unit_m: Length of the unit of a drawing, m.
         place: The place, in the coordinates of the map.
-
-    Raises:
-        BlastEnvError: As `LocalPlane.around`.
     """
     return DrawingPlane(unit_m) if crs is None else LocalPlane.around(crs, place)
 
@@ -167,20 +164,12 @@ def to_map(georeference: AnyGeoreference, places_m: FloatArray) -> FloatArray:
 
 
 def is_longitude_latitude(crs: str) -> bool:
-    """Return whether a reference system is WGS 84 in longitude and latitude, that of GeoJSON.
-
-    Raises:
-        BlastEnvError: If there is no such system.
-    """
+    """Return whether a reference system is WGS 84 in longitude and latitude, that of GeoJSON."""
     return _system(crs).to_authority() in (("EPSG", "4326"), ("OGC", "CRS84"))
 
 
 def unit_of(crs: str) -> float:
-    """Return the length of the unit of a reference system, m; 1 for longitude and latitude.
-
-    Raises:
-        BlastEnvError: If there is no such system.
-    """
+    """Return the length of the unit of a reference system, m; 1 for longitude and latitude."""
     system = _system(crs)
     return float(system.axis_info[0].unit_conversion_factor) if system.is_projected else 1.0
 

@@ -98,12 +98,7 @@ class SiteMap:
     points: int = 0
 
     def add(self, feature: MapFeature) -> None:
-        """Add an object.
-
-        Raises:
-            BlastEnvError: If there are more than `MOST_FEATURES`, or more than `MOST_POINTS`
-                points.
-        """
+        """Add an object."""
         self.features.append(feature)
         self.points += int(shapely.get_num_coordinates(feature.geometry))
         check_count(self.path, len(self.features), MOST_FEATURES, "outlines and lines")
@@ -139,11 +134,7 @@ class SiteMap:
         ]
 
     def check_coordinates(self) -> None:
-        """Refuse a map with a coordinate beyond `MOST_COORDINATE`.
-
-        Raises:
-            BlastEnvError: If it has one.
-        """
+        """Refuse a map with a coordinate beyond `MOST_COORDINATE`."""
         geometries = [feature.geometry for feature in self.features]
         coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
         is_wrong = ~(np.abs(coordinates) <= MOST_COORDINATE)
@@ -173,11 +164,7 @@ def code_of(path: Path, system: str) -> str:
     """Return a reference system by the code of its authority, such as EPSG:25832.
 
     Args:
-        path: The file.
         system: As pyproj reads it: a code, WKT or PROJJSON.
-
-    Raises:
-        BlastEnvError: If pyproj cannot read it, or it has no code.
     """
     from pyproj import CRS  # takes a tenth of a second to import
 
@@ -191,11 +178,7 @@ def code_of(path: Path, system: str) -> str:
 
 
 def check_count(path: Path, count: int, most: int, what: str) -> None:
-    """Refuse a file that has too many of something.
-
-    Raises:
-        BlastEnvError: If the count is above the most.
-    """
+    """Refuse a file that has too many of something."""
     if count > most:
         raise BlastEnvError(
             f"{path}: has more than {most:,} {what}, must have at most that many: cut a smaller "
@@ -211,12 +194,8 @@ def errors_of(package: str, path: object, kind: str) -> Iterator[None]:
     library in its traceback is a fault of this package, and passes unchanged.
 
     Args:
-        package: Name of the library.
         path: The file, or a place in it.
         kind: Its format, for the message.
-
-    Raises:
-        BlastEnvError: If the library raises an exception.
     """
     try:
         yield

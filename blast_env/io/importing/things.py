@@ -112,11 +112,7 @@ class Selector:
 
     @classmethod
     def parsed(cls, text: str, is_drawing: bool) -> "Selector":
-        """Return the selector of a text.
-
-        Raises:
-            BlastEnvError: If a part of it is empty.
-        """
+        """Return the selector of a text."""
         key, sign, value = text.partition("=")
         if not key or (sign and not value):
             example = "a layer" if is_drawing else "KEY or KEY=VALUE"
@@ -208,9 +204,6 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
     The user's selectors decide, and the usual tags for roles without any. All outlines of a map
     that marks nothing are buildings. The ledger gets the other objects, and unclear heights and
     widths.
-
-    Raises:
-        BlastEnvError: If a selector chooses nothing.
     """
     selectors, reader = _selectors(site_map), HeightReader.of(site_map)
     roles = [_role(feature, selectors, site_map) for feature in site_map.features]

@@ -48,7 +48,6 @@ def on_the_ground(things: Sequence[Thing], level_m: float, ledger: Ledger) -> li
 
     Args:
         things: Buildings with sound outlines, m.
-        level_m: Height of a storey.
         ledger: The ledger of the import.
     """
     place = _Places(things, level_m)

@@ -312,12 +312,7 @@ class CalibrationReport:
         return table
 
     def calibration(self, name: str, law: LawName = "power") -> Calibration:
-        """Return the calibration of one of the laws.
-
-        Args:
-            name: Name of the calibration.
-            law: Name of the law.
-        """
+        """Return the calibration of one of the laws."""
         study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
         # Two kinds of doubt: from distance to distance, by leaving each out, and from seed to seed,
@@ -364,9 +359,6 @@ def calibrate(
     """Fit the three laws to the runs of a study.
 
     Args:
-        study: The study.
-        runs: Its runs.
-        reference: The reference of the fits.
         simulated: The sum over the collisions to convert.
 
     Raises:

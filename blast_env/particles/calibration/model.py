@@ -309,13 +309,7 @@ def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
     """Return the calibration of a scenario, checked against its parameters.
 
     Args:
-        scenario: The scenario.
         engine: Name of the engine that runs its blasts.
-
-    Raises:
-        CalibrationError: If the scenario has no calibration, or one made with other parameters or
-            for another engine.
-        UnknownNameError: If there is no calibration of that name.
     """
     if scenario.calibration is None:
         raise CalibrationError(

@@ -174,12 +174,8 @@ def collide_with_module(
     """Collide a ball with a module: C_e, friction, load, record and shrinking.
 
     Args:
-        ball: The ball.
         surface: The face or corner that it touches.
         modules: The modules of the surfaces.
-        loads: The loads of the modules.
-        time_s: Time of the collision.
-        rules: The rules.
         row: Row for the record of the collision, filled except for the number of the ball.
 
     Returns:

@@ -339,8 +339,6 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     """Return a scene as arrays.
 
     Args:
-        scene: The scene.
-        parts: Its modules.
         cell_units: Side of a cell, at least the diameter of the largest ball; affects only the
             time of computation. By default a side suitable for the scene.
 

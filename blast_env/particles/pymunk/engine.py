@@ -73,7 +73,6 @@ class StepGuard:
         """Update the bounds of speeds by the contacts of a step; halve the time step if needed.
 
         Args:
-            contacts: The contacts.
             mass: Masses of all balls (n,).
             kick: Base impulse on every new pair.
         """

@@ -125,7 +125,6 @@ def build_space(scene: Scene, obstacles: tuple[ModularObstacle, ...]) -> PymunkS
     A reused space would not reproduce a run to the last bit.
 
     Args:
-        scene: The scene.
         obstacles: The scene's obstacles, which collect the hits.
     """
     parameters = scene.parameters
@@ -394,7 +393,6 @@ class WallSides:
 
         Args:
             ball: Index of the ball.
-            module: The module.
             centre: Centre of the ball relative to that of the module, units.
             before: The same one step before, units.
         """
