@@ -27,7 +27,6 @@ class Bay:
     """A part of a wall.
 
     Attributes:
-        structure: Name of the structure.
         wall: The side that it faces: west, east, south or north.
         storey: Counted from 1 at the ground.
         number: Counted from 1 along the wall, from west to east or from south to north; for a
@@ -38,7 +37,6 @@ class Bay:
         floor_m: Height of its floor above the ground.
         top_m: Height of its upper edge.
         line_number: Index of the wall of a polygon; `None` for a rectangle.
-        line: That wall.
     """
 
     structure: str

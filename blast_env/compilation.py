@@ -69,7 +69,6 @@ class _Sources:
 
     Attributes:
         package: The top-level package; Numba's version stands for other ones.
-        paths: Files of the functions and types.
         constants: Names and values of the constants, in order of their use.
     """
 

@@ -21,7 +21,6 @@ class Piece(NamedTuple):
     Attributes:
         row: Row of its lower left cell.
         column: Column of that cell.
-        item: Name of the item.
         turned: Whether its length runs upwards rather than to the right.
     """
 

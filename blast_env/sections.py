@@ -221,7 +221,6 @@ class MapGeoreference(Georeference):
 
     Attributes:
         longitude_deg: Longitude of the site's lower left corner, WGS 84.
-        latitude_deg: Its latitude.
         crs: Coordinate reference system of layouts exported to the map, as pyproj reads it:
             `EPSG:4326` (longitude, latitude), `EPSG:25832`.
     """

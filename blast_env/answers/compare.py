@@ -155,8 +155,6 @@ class BuildingVerdict(NamedTuple):
     """The response of a building to one blast, without the histories on its bays.
 
     Attributes:
-        building: Its name.
-        severity: Severity of the response.
         is_clipped: Whether its level on the cells, which clip peaks, is higher.
         cells: Its cells in the table of buildings.
         flags: Reasons to distrust the verdict.

@@ -172,8 +172,6 @@ class Table:
     """A table.
 
     Attributes:
-        title: Its title.
-        headers: The headers.
         rows: The rows: texts and numbers.
         texts: Number of leading text columns; the others are aligned to the right.
         after: Number of text columns at the end.
@@ -214,8 +212,6 @@ class Picture:
     """A picture.
 
     Attributes:
-        caption: Its caption.
-        png: The picture as PNG.
         is_large: Whether it is larger than others on paper.
     """
 
@@ -254,11 +250,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """A document.
-
-    Attributes:
-        sections: Its sections.
-    """
+    """A document."""
 
     sections: tuple[Section, ...]
 

@@ -24,8 +24,6 @@ class SearchRun:
     """A finished search.
 
     Attributes:
-        problem: Its problem.
-        result: Its result.
         seconds: Its duration.
         cache_hits: Number of its loads found in the cache.
     """

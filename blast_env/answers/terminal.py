@@ -61,9 +61,6 @@ class TableView:
 
     Rich's table cuts words if columns do not fit. This one then splits the columns into several
     tables one below the other, each with the first column, so that rows keep their names.
-
-    Attributes:
-        table: The table.
     """
 
     table: Table

@@ -83,7 +83,6 @@ class BlastPictures(FileRecord):
     """The pictures of a blast; written last, the file marks a complete blast.
 
     Attributes:
-        pictures: The pictures.
         seconds: Duration of the run and of the drawing, s.
         repeat: The data to run it again: scenario hash, charge, versions.
     """
@@ -102,7 +101,6 @@ class BlastTask(BlastingTask):
     """Blasts of one layout, one per threat.
 
     Attributes:
-        layout: The layout.
         blasts: Folder for the pictures of blasts, each under its key.
     """
 

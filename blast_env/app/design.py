@@ -22,7 +22,6 @@ class Design:
     """A site and its layouts, all of them legal but for the budget.
 
     Attributes:
-        scenario: The site.
         layouts: One for each of `SLOTS`.
         active: Number of the active layout, which edits change.
     """

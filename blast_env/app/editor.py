@@ -51,7 +51,6 @@ class Ghost:
     """The preview of an element or thing at the mouse.
 
     Attributes:
-        rectangle_m: Its rectangle.
         reason: The reason why it cannot stand there; empty if it can.
         line_m: The ends of a line, a diagonal of the rectangle; `None` for an area.
     """
@@ -79,12 +78,10 @@ class Editor:
     """The editor of one page for a design.
 
     Attributes:
-        session: The design.
         tool: The current tool.
         item: Name of the item to place.
         turned: Whether it is placed turned.
         new_height_m: Height of a structure to draw; `None` for the height of the air.
-        selected: The selected thing.
         cursor: The cell of the keyboard; `None` before its first use.
         ghost: The preview at the mouse.
         pending: The layout under an unfinished stroke; `None` without one.

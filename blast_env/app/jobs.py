@@ -84,8 +84,6 @@ class Running:
     """A task at work.
 
     Attributes:
-        folder: Its folder.
-        process: Its process.
         line: A message on it stops the task.
         stop_by_s: Time at which the process is killed, once it is to stop.
     """

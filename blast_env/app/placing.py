@@ -26,7 +26,6 @@ class Placeable(NamedTuple):
 
     Attributes:
         name: Its name; empty for the single module.
-        label: Its label.
         can_turn: Whether it can be turned by a right angle.
         left: Number of them left.
     """
@@ -41,7 +40,6 @@ class Measurable(NamedTuple):
     """An optional measure of a layout: it hardens facades or removes structures.
 
     Attributes:
-        name: Its name.
         label: Its label, with its cost.
         words: Its effect and its place.
         is_taken: Whether the layout takes it.

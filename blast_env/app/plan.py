@@ -65,7 +65,6 @@ class PixelView:
         bottom_m: Lower border.
         pixels_per_m: Scale.
         width_px: Width of the picture.
-        height_px: Its height.
     """
 
     left_m: float

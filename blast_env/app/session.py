@@ -51,13 +51,7 @@ _DPI: Final = 100
 
 @dataclass(frozen=True)
 class LayoutView:
-    """A layout with a blast to show beside others.
-
-    Attributes:
-        name: Its name.
-        layout: The layout.
-        key: Key of its blast.
-    """
+    """A layout with a blast to show beside others."""
 
     name: str
     layout: Layout
@@ -69,8 +63,6 @@ class Session:
     """An open design.
 
     Attributes:
-        folder: Its folder.
-        work: The work folder.
         workers: The worker processes.
         history: The design with its steps.
         cells: The cells of new blasts and of the results shown; searches take larger ones.
@@ -550,7 +542,6 @@ class Sessions:
     """The open designs, one session per design for all its tabs.
 
     Attributes:
-        work: The work folder.
         workers: The worker processes for all designs.
     """
 

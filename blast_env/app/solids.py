@@ -30,7 +30,6 @@ class SolidBox(NamedTuple):
     """A box.
 
     Attributes:
-        centre_m: Its centre.
         size_m: Its sides.
         colour: Its colour, `#rrggbb`.
         opacity: 1, or less for a see-through box: as high as the air, or a place of a charge.

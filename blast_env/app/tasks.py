@@ -34,7 +34,6 @@ class SearchTask(BlastingTask):
     """A search for a layout, or a proposal without a blast.
 
     Attributes:
-        method: Name of the proposer.
         budget: Most blasts; 0 for a proposer that runs none.
     """
 
@@ -99,9 +98,6 @@ class AnswerTask(BlastingTask):
     """A question on a layout.
 
     Attributes:
-        layout: The layout.
-        name: Its name.
-        question: The question.
         subject: Digest of the site, the layout and the threats.
         target: Required level of protection.
         mass_error: Uncertainty of the masses; see `Uncertainty`.
@@ -172,8 +168,6 @@ class ReportTask:
     """A report on one layout.
 
     Attributes:
-        site: The site.
-        layout: The layout.
         options: Its threats and contents.
         page: The page to write, .html.
         pdf: The same as PDF; `None` for none.

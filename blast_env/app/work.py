@@ -27,7 +27,6 @@ class Status(FileRecord):
     """The progress of work.
 
     Attributes:
-        state: Its state.
         title: Its title on the page.
         share: Completed share, 0 to 1.
         text: The current activity, the result or the error.
@@ -123,7 +122,6 @@ class BlastingTask:
     """What all work with blasts has.
 
     Attributes:
-        site: The site.
         threats: The threats: a single one is known, several are hidden.
         cache: Folder of the store of blasts.
         cells: The cells of the page; a search has cells twice as large.
@@ -153,9 +151,7 @@ class Answer(FileRecord):
     """The answer to a question.
 
     Attributes:
-        question: The question.
         subject: Digest of the site, the layout and the threats.
-        document: The answer.
     """
 
     question: Question

@@ -16,11 +16,7 @@ from blast_env.errors import MissingExtraError
 
 @dataclass(frozen=True)
 class BlastConditions:
-    """Conditions of an EngiBench problem: the name alone, since nothing can be varied.
-
-    Attributes:
-        problem: Name of the problem.
-    """
+    """Conditions of an EngiBench problem: the name alone, since nothing can be varied."""
 
     problem: str
 

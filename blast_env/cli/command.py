@@ -33,8 +33,6 @@ class Target(NamedTuple):
     """A file or folder that a command is to write.
 
     Attributes:
-        option: The option that names it.
-        path: Its path.
         suffixes: The allowed suffixes of a file; none for a folder.
     """
 

@@ -202,7 +202,6 @@ class ChargeInput:
     """The place and the mass of the charge, where the user gives them.
 
     Attributes:
-        place_m: The place, m.
         mass_kg: The mass, kg TNT.
     """
 

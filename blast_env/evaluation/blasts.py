@@ -55,7 +55,6 @@ class Blasts:
         case: The site and the threats.
         layouts: The layouts by name, no barrier first, the one in question last.
         records: Their records, one per threat.
-        engine: The engine.
         coarse: The same layouts on coarser cells, under some of the threats; `None` without.
     """
 

@@ -373,7 +373,6 @@ class WallsWithoutVerdict(NamedTuple):
     """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
 
     Attributes:
-        building: Name of the building.
         area_m2: Area of these walls that touches air, m2.
         of_m2: Area of all counted walls of the building that touches air, m2.
         structures: The parts of the building with such walls.
@@ -430,7 +429,6 @@ class WallLoad(NamedTuple):
     """The mean load on the most loaded wall of a building, whether or not its walls count.
 
     Attributes:
-        wall: The wall.
         peak_pa: Peak overpressure, reflected, mean over the wall.
         impulse_pa_s: Impulse, reflected, mean over the wall.
     """

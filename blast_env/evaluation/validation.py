@@ -34,7 +34,6 @@ class Validation(NamedTuple):
     """A validation status with its reason.
 
     Attributes:
-        status: The status.
         reason: The reason, in words.
     """
 

@@ -30,9 +30,6 @@ class PlacementRules:
     """What the legal places after a placement follow from, on one site.
 
     Attributes:
-        scenario: The scenario.
-        zone: Its build zone.
-        catalogue: The catalogue.
         costs: Cost of each variant by its lower left cell (variants, rows, columns).
         dearest: The largest of these costs at a place that is legal on the empty site.
         passable: Cells that are free of structures (rows, columns).

@@ -31,9 +31,6 @@ class LegalLayout(tuple[Element, ...]):
     """A layout that was checked against all conditions of a build zone.
 
     It equals the plain tuple; see `LayoutState.checked`.
-
-    Attributes:
-        scenario: The scenario against which it was checked.
     """
 
     scenario: Scenario

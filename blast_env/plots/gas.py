@@ -40,7 +40,6 @@ class Kind:
     """The presentation of a quantity.
 
     Attributes:
-        name: Its name.
         unit: Its unit.
         column: Its column in the tables of a result.
         factor: Conversion from the column to the unit.
@@ -252,8 +251,6 @@ class _BuildingWalls:
     """A structure, or the parts of a building, as a single box with walls.
 
     Attributes:
-        name: Its name.
-        parts: Names of the structures.
         rectangle_m: The rectangle around them.
         height_m: The height of the highest.
         faces: The assessed walls for at least one of them.

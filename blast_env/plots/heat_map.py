@@ -130,12 +130,7 @@ def heat_map(result: BlastResult, among: Sequence[BlastResult] = ()) -> Figure:
 
 @dataclass(frozen=True, eq=False)
 class _Building:
-    """A building, or a structure, to enlarge.
-
-    Attributes:
-        name: Its name.
-        obstacles: Its structures.
-    """
+    """A building, or a structure, to enlarge."""
 
     name: str
     obstacles: tuple[ModularObstacle, ...]

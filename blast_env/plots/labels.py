@@ -48,7 +48,6 @@ class LabelPlacement:
     """A label and its position.
 
     Attributes:
-        label: The label.
         place: Rectangle of its text.
         leader: A line from its feature to the text, if the two are far apart.
     """

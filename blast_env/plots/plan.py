@@ -103,7 +103,6 @@ class FeatureKind:
         name: Name of its layer in drawings and of its `kind` in maps.
         words: Name in legends.
         level: Order of drawing; kinds of a higher level lie on top.
-        look: Its look.
         named: Place of its name in drawings: inside it, explained by a letter beside it, or none.
     """
 
@@ -232,7 +231,6 @@ class Feature:
     """One feature of the site.
 
     Attributes:
-        kind: Its kind.
         places_m: (x, y) of a point, of the two ends of a line, or of the corners of an area,
             counterclockwise, for a rectangle from the lower left one.
         name: For people: a structure's name, the reason of a no-build area, a module's identifier.

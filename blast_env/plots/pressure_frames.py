@@ -112,8 +112,6 @@ class PressureShot:
     """A blast with pictures of the overpressure in two planes.
 
     Attributes:
-        result: The blast.
-        section: The section.
         opening: Its stage before the grid.
         planes: Pictures in plan and in the section.
     """

@@ -85,8 +85,6 @@ class Drawing(NamedTuple):
     """A picture of a threat.
 
     Attributes:
-        caption: Its caption.
-        png: The picture as PNG.
         is_facade: Whether it shows the damage of unfolded facades.
     """
 

@@ -53,9 +53,7 @@ class RigidPiece:
     """A barrier piece on the ground, per metre of its length.
 
     Attributes:
-        height_m: Height.
         base_m: Width of its base.
-        mass_kg_m: Mass per metre of length.
         friction: Coefficient of friction with the ground.
         anchor_n_m: Horizontal capacity of its anchors, N per metre; 0 without anchors.
     """

@@ -81,7 +81,6 @@ class GroundThreshold:
     """A side-on peak overpressure from which an effect must be expected on the ground.
 
     Attributes:
-        words: The effect.
         peak_pa: Least side-on peak overpressure for it.
         source: Source of the value.
     """

@@ -85,7 +85,6 @@ class Interlayer(BaseModel):
 
     Attributes:
         material: Whether it lies between plies, or is a film on the pane.
-        thickness_mm: Thickness.
         tension_n_m: Tension of the broken pane in its plane, N/m.
         tear_share: Deflection at which it tears or leaves the frame, over the short side.
     """
@@ -107,8 +106,6 @@ class Glazing(_Component):
     """Windows: as many equal panes as fit into the bay, at least one.
 
     Attributes:
-        width_m: Width of a pane.
-        height_m: Height of a pane.
         thickness_mm: Minimum thickness of the glass by its standard; of laminated glass, the sum
             of all plies.
         glass: Heat treatment.
@@ -131,8 +128,6 @@ class Wall(_Component):
     """A wall panel that spans from floor to floor.
 
     Attributes:
-        section: Its section.
-        supports: Its support by the floors.
         span_m: Its span; the height of the storey by default.
     """
 
@@ -180,7 +175,6 @@ class FacadeBay:
     """A bay with its components.
 
     Attributes:
-        bay: The bay.
         glazing: Its windows; `None` without.
         wall: Its wall panel; `None` without.
     """
@@ -227,8 +221,6 @@ class Alternatives:
     """A bay with its possible components.
 
     Attributes:
-        name: Name of the bay.
-        structure: Name of its structure.
         glazing: Possible windows, by the name of their component.
         wall: Possible wall panels, by the name of their component.
     """

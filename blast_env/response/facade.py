@@ -38,13 +38,11 @@ class FacadeResponse:
     """Response of the bays of a facade to one blast.
 
     Attributes:
-        bays: The bays.
         time_s: Times of the histories: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay (bays, times).
         glazed: Indices of the bays with windows (glazed,).
         glazing: Responses of their panes.
         walled: Indices of the bays with wall panels (walled,).
-        walls: Responses of the panels.
     """
 
     bays: tuple[FacadeBay, ...]

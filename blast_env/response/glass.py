@@ -104,8 +104,6 @@ class Pane:
     """A pane of glass in a wall, supported on all four sides.
 
     Attributes:
-        width_m: Width.
-        height_m: Height.
         thickness_m: Minimum thickness of the glass by its standard; of laminated glass, the sum of
             all plies, which bend as one at the rate of a blast.
         kind: Heat treatment.

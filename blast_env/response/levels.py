@@ -48,9 +48,6 @@ class BayDamage:
     """Damage of one bay under one blast.
 
     Attributes:
-        name: Name of the bay.
-        structure: Name of its structure.
-        area_m2: Its area.
         glazed_m2: Area of its panes.
         damage: Damage by the name of the component, present or possible.
     """

@@ -27,7 +27,6 @@ class Requirement:
     """A requirement on panes, wall panels and loads.
 
     Attributes:
-        words: It in words.
         level: Level of protection that panes allow, and wall panels unless `glass_only`.
         glass_only: Whether wall panels do not count.
         peak_pa: Largest peak on a bay; infinite without a limit.

@@ -97,9 +97,7 @@ class System:
     """A single-degree-of-freedom system, per loaded area.
 
     Attributes:
-        mass_kg_m2: Mass per area.
         load_mass_factor: K_LM.
-        resistance: Resistance per area.
     """
 
     mass_kg_m2: float

@@ -143,7 +143,6 @@ class ReinforcedConcrete(_Section):
     the supports (`design_stress_pa`); the lever arm stays that of the whole section.
 
     Attributes:
-        thickness_m: Thickness.
         steel_share: Area of tension steel over that of the section above the centre of the steel.
         cover_m: Depth of the centre of the steel below the face.
         concrete_pa: Compressive strength.

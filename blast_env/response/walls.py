@@ -40,7 +40,6 @@ class Panel:
     """A wall panel or slab that spans one way.
 
     Attributes:
-        section: Its section.
         span_m: Distance between its supports; length of a cantilever.
         supports: Its support conditions.
     """
@@ -172,7 +171,6 @@ class PanelResponses:
     """Responses of panels to their histories.
 
     Attributes:
-        motion: Their motion.
         ductility: Largest deflection over that at yield (panels,).
         rotation_deg: Largest support rotation (panels,).
         damage: Damage as a number, see `Limits.measure` (panels,).

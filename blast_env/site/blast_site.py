@@ -63,7 +63,6 @@ class BlastSite:
 
     Attributes:
         site_m: The simulated area.
-        charge: The charge.
         structures: The structures and, if there is one, the barrier.
         gauges: Virtual gauges; the particle engines ignore them.
         air_height_m: Height of the simulated air; the particle engines ignore it.

@@ -44,7 +44,6 @@ class Barrier(SparseSection):
         cost: Cost of a piece outside all cost areas; in the stock list, 1 is about a metre of
             concrete road barrier.
         rotatable: Whether it may be turned by a right angle.
-        stops_vehicles: Whether it stops vehicles.
         mass_kg: Mass of a piece; that of a solid block of concrete unless given.
         base_width_m: Width of its base; its thickness unless given.
         anchorage_n: Horizontal capacity of the anchors of a piece, N; none unless given.
@@ -166,7 +165,6 @@ class Hardening(FacadePart):
         name: Name in layouts and tables.
         description: Description for readers.
         structures: Names of its structures; all with a facade unless given.
-        cost: Cost of the measure.
     """
 
     name: Name
@@ -197,7 +195,6 @@ class Demolition(Section):
         name: Name in layouts and tables.
         description: Description for readers.
         structures: Names of the structures, none of them protected.
-        cost: Cost of the measure.
     """
 
     name: Name
@@ -223,7 +220,6 @@ class Variant(NamedTuple):
         columns: Columns of cells that it covers; 0 for a measure.
         height_m: Its height; `None` is the height of the air.
         cost: Cost of a piece outside all cost areas.
-        stops_vehicles: Whether it stops vehicles.
         crash_rating: Its crash rating; without one, it stops every vehicle.
         kind: Class of its elements.
     """
@@ -255,10 +251,8 @@ class ModulePlace(NamedTuple):
     """One module of a layout.
 
     Attributes:
-        cell: Its cell.
         height_m: Its height; `None` is the height of the air.
         piece: Name of its piece; empty for a single module.
-        stops_vehicles: Whether it stops vehicles.
     """
 
     cell: Cell

@@ -41,7 +41,6 @@ class BayComponents:
     """A bay with the names of its components.
 
     Attributes:
-        bay: The bay.
         window: Component of its windows in the facade, which has their sizes and sills.
         glazing: Component of their glass.
         wall: Component of its wall panel.

@@ -61,7 +61,6 @@ class MassPreset:
     """A mass of TNT with a name.
 
     Attributes:
-        name: Its name.
         tnt_kg: TNT-equivalent mass.
     """
 

@@ -172,7 +172,6 @@ class VehicleCharge:
     """The charge of a vehicle without a layout; see `WorstPlaces`.
 
     Attributes:
-        source: The vehicle.
         rank: Rank of its place among the worst places, from 0.
     """
 

@@ -264,7 +264,6 @@ class PolygonSection(StructureSection):
 
     Attributes:
         outline_m: Corners of its outline, in either order.
-        courtyards_m: Corners of each of its courtyards.
     """
 
     kind: Annotated[Literal["polygon"], HashMark.OF_PLACES]

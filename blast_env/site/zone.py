@@ -307,7 +307,6 @@ class Surroundings:
     """A build zone with all that decides the usable cells before any module is placed.
 
     Attributes:
-        zone: The build zone.
         structures: The structures on the site.
         sources: The sources of the charge.
         charge_radius_m: Radius of the charge's disc.
@@ -326,7 +325,6 @@ class EmptyZone:
     """The cells of a build zone without modules; all arrays are read-only.
 
     Attributes:
-        catalogue: The catalogue.
         usable: Whether each cell may be used, shape (rows, columns).
         passable: Whether each cell is free of structures without a passage, shape (rows, columns).
         ground_m: Height of the ground of each cell, shape (rows, columns).

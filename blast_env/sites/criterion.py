@@ -280,7 +280,6 @@ class _Sight:
     """The lines of sight as bits.
 
     Attributes:
-        lines: The lines.
         bits: Their order.
         by_height: Lines that a module of each height would cut (rows, columns, words).
         by_variants: Lines that each action would cut, of which a piece that reaches beyond the zone

@@ -40,7 +40,6 @@ class ItemKind(NamedTuple):
     """An item of the catalogue that all sites of the family share, for equal action spaces.
 
     Attributes:
-        name: Name of the item.
         length_modules: Modules along its length.
         thickness_modules: Modules across it.
         rotatable: Whether it may be turned.
@@ -77,35 +76,29 @@ class ItemSiteRanges(SquareRanges):
     without one.
 
     Attributes:
-        air_height_m: Height of the air, m.
         tnt_kg: TNT-equivalent mass of the charge.
         vehicle_probability: Probability that a vehicle carries the charge.
         parking_probability: Probability, without a vehicle, of a charge on a parking area instead
             of a road.
         road_length_m: Length of the road or parking area along the border, m.
         entry_m: Length of the vehicle's entry along the border, m.
-        vehicle_width_m: Width of the vehicle, m.
         forecourt_m: Extent of the drivable ground along the border, m; it lies within the build
             zone's extent, so that barriers can close it.
         kerb_m: Distance from the end of that ground to the building, m.
         zone_from_border_m: From the left border to the build zone, m.
         stand_off_m: From road, parking area or border to the nearest building, m.
         facade_m: Length of the facades of the protected buildings, m.
-        depth_m: Their depth, m.
         storeys: Their number of storeys, 3 m each.
         second_probability: Probability of a second protected building beside the first.
         second_weight: Weight of its load; that of the first is 1.
         shed_probability: Probability of an unprotected shed, if there is room.
-        shed_side_m: Its sides, m.
         shift_m: From the middle of the site to that of road, entry and building, m.
         path_probability: Probability of a path to the door that is kept free.
-        path_width_m: Its width, m.
         trees: Number of trees, each a no-build area.
         tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a piece and a building, m.
         access_way_probability: Probability of an access way that must stay open; with a vehicle it
             has a gate.
-        access_way_width_m: Its width, m.
         duct_probability: Probability of a strip with higher costs.
         duct_factor: Factor of the costs there.
         item_probability: Probability that an item is in stock; one of the two T-walls always is,

@@ -49,11 +49,9 @@ class SiteRanges(SquareRanges):
         road_length_m: Length of the stretch of road with the charge, m.
         parking_probability: Probability of a parking area instead of the road.
         parking_length_m: Length of a parking area along the road, m.
-        parking_depth_m: Its depth, m.
         threat_shift_m: From the middle of the site to that of road or parking area, m.
         stand_off_m: From road or parking area to the facade of the protected building, m; limited
             by the room on the site.
-        facade_m: Length of that facade, m.
         depth_m: Depth of the protected building, m; limited by the room on the site.
         building_shift_m: From the middle of the site to that of the facade, m.
         neighbour_probability: Probability of an unprotected building, if there is room.
@@ -62,13 +60,11 @@ class SiteRanges(SquareRanges):
         zone_shift_m: From midway between threat and facade to the zone's middle, along the
             road, m.
         path_probability: Probability of a path from the road to the door that is kept free.
-        path_width_m: Its width, m.
         hydrant_probability: Probability of a hydrant, a no-build area 1.5 m square.
         trees: Number of trees, each a no-build area.
         tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a module and a building, m.
         access_way_probability: Probability of an access way that must stay open.
-        access_way_width_m: Its width, m.
         stock: Number of modules.
         duct_probability: Probability of a budget, and of a duct with dearer modules above it.
         duct_width_m: Width of the strip above the duct, m.

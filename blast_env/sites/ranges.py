@@ -147,11 +147,7 @@ class SquareRanges(Ranges):
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws of random values; each method takes one number from the stream.
-
-    Attributes:
-        rng: The random stream.
-    """
+    """Draws of random values; each method takes one number from the stream."""
 
     rng: np.random.Generator
 

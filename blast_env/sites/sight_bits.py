@@ -26,7 +26,6 @@ class SightBits:
         place: Number of the bit of each line (lines,).
         weights: The distinct weights (weights,).
         firsts: The first word of each weight (weights,).
-        words: Number of words.
     """
 
     place: IntArray

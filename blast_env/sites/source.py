@@ -55,9 +55,7 @@ class SiteSource:
     """A `ScenarioSource` of generated sites with consecutive seeds.
 
     Attributes:
-        first_seed: Seed of the first site.
         count: Number of sites, at least 1.
-        ranges: Ranges of the sites.
         criterion: Acceptance criterion; the family's default unless given.
 
     Raises:

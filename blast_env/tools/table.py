@@ -28,9 +28,7 @@ class Tool:
     """A tool.
 
     Attributes:
-        name: Its name.
         description: What it does, for a model.
-        arguments: Record of its arguments.
         result: Record of its result.
         function: Method of its owner, a session.
     """

@@ -67,7 +67,6 @@ class CrashRating(Section):
     In a file it is a table with these keys, or the code of the test as text.
 
     Attributes:
-        mass_kg: Mass of the test vehicle.
         speed_km_h: Its speed across the barrier: in a test at an angle, less than along its way.
         penetration_m: Penetration of its load; 0 if none. Places of charges are that far beyond
             the rear of the barrier, which is on the safe side of a rating from the front.
@@ -153,7 +152,6 @@ class CrashPiece(NamedTuple):
 
     Attributes:
         rectangle: Its rectangle, m.
-        rating: Its crash rating.
         name: Its name in messages.
     """
 

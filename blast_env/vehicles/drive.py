@@ -40,8 +40,6 @@ class VehicleGround:
     """A vehicle with its surroundings on the empty site.
 
     Attributes:
-        source: The vehicle.
-        site: The site.
         standing_m: The rectangles of the structures that it cannot pass below.
         walls: The loaded walls of the protected structures.
         gates: Gates that stop it at any speed.
@@ -145,7 +143,6 @@ class Impact(NamedTuple):
     """The fastest impact of a vehicle on a piece with a crash rating.
 
     Attributes:
-        piece: The piece.
         speed_km_h: Largest impact speed.
         holds: Whether it stops the vehicle.
     """

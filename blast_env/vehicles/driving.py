@@ -54,7 +54,6 @@ class SpeedField:
     """The largest speeds of a vehicle, by direction and place.
 
     Attributes:
-        motion: Motion of the vehicle.
         half_m: Half of its width.
         run_up_m: Run-up from standstill for each speed (directions, rows, columns), below 0 for
             unreachable states; place (row, column) is at `STEP_M * (column, row)`.

@@ -181,7 +181,6 @@ class ReachQuery:
     """The input of the computation of a vehicle's reach.
 
     Attributes:
-        site: The site.
         width_m: Side of the vehicle's square.
         entries_m: Strips of its entries, just inside the border.
         closed_m: Obstacles that it must not cover.

@@ -32,7 +32,6 @@ class WorstPlaces:
     middle of its wall comes first, then the leftmost, then the lowest.
 
     Attributes:
-        source: The vehicle.
         places_m: The places, at least one and at most `Vehicle.places`.
         distances_m: Distance of each place from the nearest loaded wall.
     """
@@ -82,7 +81,6 @@ class PlainGround:
     They are those of `worst_of` at all places of the reach, found without the reach.
 
     Attributes:
-        source: The vehicle.
         query: Its reach on the empty site.
         walls_m: The loaded walls (walls, 4).
         middles_m: Their middles (walls, 2).

@@ -31,7 +31,6 @@ class _Found:
     """A blast with its pictures.
 
     Attributes:
-        shown: The layout.
         blasts: Its blasts and those without a barrier.
         number: Number of the threat in them.
         pictures: Its pictures by their labels, each with its address.

@@ -42,12 +42,7 @@ _STATES: Final = {
 
 @dataclass
 class _Card:
-    """Work on the page; its elements are bound to its status, and stay while that changes.
-
-    Attributes:
-        folder: The folder of the work.
-        status: Its status.
-    """
+    """Work on the page; its elements are bound to its status, and stay while that changes."""
 
     folder: Path
     status: Status

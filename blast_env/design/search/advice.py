@@ -65,7 +65,6 @@ class LayoutTrial:
         cost: Its cost, in the unit of the zone's budget.
         damage: The worst damage of all components under all charges, from 0 to 5; see
             `blast_env.response.damage`.
-        layout: The layout.
     """
 
     worth: float
@@ -79,7 +78,6 @@ class Advice:
     """The best layout of a kind of measures.
 
     Attributes:
-        kind: The kind.
         best: The cheapest layout that passes, or else the one with the least shortfall.
         blasts: Blasts requested.
         tried: All assessed layouts.

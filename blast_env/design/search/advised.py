@@ -124,12 +124,7 @@ class AdviceJudge:
 
 @dataclass(frozen=True, eq=False)
 class AdviceResult:
-    """The best layouts of all kinds, and the verdicts on them.
-
-    Attributes:
-        judge: The verdicts.
-        found: The best layout of each kind.
-    """
+    """The best layouts of all kinds, and the verdicts on them."""
 
     judge: AdviceJudge
     found: Sequence[Advice]

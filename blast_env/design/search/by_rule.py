@@ -59,7 +59,6 @@ class ProposerRow:
     Attributes:
         make: Makes the proposer with its default settings, and imports what takes long to import.
         title: Name for readers.
-        kind: Kind of the proposer.
         needs: Properties that it requires of a site. Lists for other sites omit it.
         budget: Default budget, in blasts.
     """
@@ -80,7 +79,6 @@ class RuleProposer:
     """Proposes the layout of a rule without simulating a blast.
 
     Attributes:
-        name: Name of the rule.
         rule: Function that returns the layout.
     """
 

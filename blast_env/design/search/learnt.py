@@ -50,7 +50,6 @@ class Guesses:
     """Cached predictions of a surrogate for the layouts of a case.
 
     Attributes:
-        surrogate: The surrogate.
         case: The scenario and its threats.
         site: The scenario as the surrogate represents it.
     """
@@ -148,8 +147,6 @@ class SurrogateSearch(Search):
     and then on changes of the best of these by one or two moves, in favour of the better ones.
 
     Attributes:
-        surrogate: The surrogate.
-        agent: The agent.
         digest: Digest of both, which identifies results.
         changes: Number of changed layouts to predict in a search without blasts.
         ranked: Number of samples of the agent in a search without blasts, with a surrogate.

@@ -80,7 +80,6 @@ class PopulationAnnealingSearch(Search):
         from_rules: Whether the layouts of the rules are among the initial ones.
         draw: Draws the random initial layouts.
         starting_share: Share of the exploration spent on initial layouts.
-        exchanges: Number of exchanges.
         exchanged_share: Share of the walkers that restart from the best ones at an exchange.
         hot: Initial temperature, relative to the load of the best initial walker.
         cold: Final temperature, relative to the same load.

@@ -106,7 +106,6 @@ class Moves:
     """Draws a neighbour of a layout.
 
     Attributes:
-        scenario: The scenario.
         reach_cells: Standard deviation of the displacement of a module, a piece or a wall, in
             cells.
         far_share: Share of the moves that relocate a module or piece to a random place.

@@ -69,7 +69,6 @@ class SearchResult:
 
     Attributes:
         layout: The layout, its cells sorted; empty if a search ended before it had one.
-        method: Name of the proposer.
         by: Description of the source of the layout, for a proposer that consults others.
         gain: Relative reduction of the load that the proposer predicts; `None` without a
             prediction.

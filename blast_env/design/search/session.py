@@ -35,7 +35,6 @@ class Plan:
 
     Attributes:
         threats: Number of threats per layout during exploration.
-        exploring_blasts: Number of blasts for exploration.
     """
 
     threats: int

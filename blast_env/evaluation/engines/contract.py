@@ -59,7 +59,6 @@ class RunnableBlast(ABC):
         scenario: The scenario, or its bundled name or path.
         layout: Cells of the build zone that hold a barrier module.
         seed: Draws the charge where the scenario leaves it open; for particles the fan and the air.
-        engine: The engine.
         charge: The charge, instead of one drawn from the scenario.
     """
 

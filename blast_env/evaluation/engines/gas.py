@@ -251,9 +251,7 @@ class BlastMeasurement:
     """A finished blast with its record.
 
     Attributes:
-        result: The blast.
         histories: Mean overpressures on walls.
-        record: The record.
     """
 
     result: "GasResult"

@@ -30,12 +30,7 @@ class PeakSource(StrEnum):
 
 @dataclass(frozen=True)
 class PeakWeight:
-    """The peak on a building to compare with limits.
-
-    Attributes:
-        pa: The peak.
-        source: Its source.
-    """
+    """The peak on a building to compare with limits."""
 
     pa: float
     source: PeakSource

@@ -93,7 +93,6 @@ class PieceLoads:
     Attributes:
         elements: The pieces or modules with a height, in the order of the layout.
         bodies: Each as a rigid body.
-        zone: The build zone.
         ways: The axes along which the pieces are loaded.
         patches: Patch of the recorder on each piece and wall, -1 for no load (pieces, 4).
         recorder: The histories, one per patch.

@@ -42,7 +42,6 @@ class Edge:
     """The most severe charge that keeps a level.
 
     Attributes:
-        charge: The charge.
         stand_off_m: Its distance from the nearest protected wall.
         is_kept: Whether it keeps the level; else not even the least severe charge tried does.
         is_end: Whether it is an end of the ladder.
@@ -87,7 +86,6 @@ class Ladder:
 
     Attributes:
         evaluator: Its scenario, its engine, and its store of blasts.
-        layout: The layout.
         charge: The charge of the scenario at its place.
     """
 
@@ -189,7 +187,6 @@ class PlaceCapacity:
     """The most severe charges at one place that keep the levels of protection.
 
     Attributes:
-        layout: Name of the layout.
         charge: The charge of the scenario at the place.
         stand_off_m: Its distance from the nearest protected wall.
         heavier: The largest mass for each level, the lowest first.

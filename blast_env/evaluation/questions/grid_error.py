@@ -136,8 +136,6 @@ class Effect(NamedTuple):
     """A number of a blast with a layout and without a barrier; errors are NaN with one size.
 
     Attributes:
-        value: With the layout.
-        unprotected: Without a barrier.
         reduction: Share that is gone; NaN without a load.
         error: Grid error of `value`, in its unit.
         unprotected_error: That of `unprotected`.

@@ -71,13 +71,7 @@ def check_limits(limits: Sequence[Limit], buildings: Sequence[str]) -> None:
 
 
 class LoadLimit(NamedTuple):
-    """A load with its limit.
-
-    Attributes:
-        limit: The limit.
-        threat: Name of the threat.
-        load: The load.
-    """
+    """A load with its limit."""
 
     limit: Limit
     threat: str
@@ -101,7 +95,6 @@ class SiteVerdict:
     Attributes:
         found: The response of its buildings.
         target: Required level of protection of those with a facade.
-        limited: The loads with a limit.
     """
 
     found: Consequences

@@ -80,7 +80,6 @@ class BayScreening:
     """A bay under one charge.
 
     Attributes:
-        filled: The bay.
         distance_m: Distance of its middle from the charge.
         in_sight: Whether the charge sees its middle.
         peak_pa: Peak of its load.
@@ -93,7 +92,6 @@ class BayScreening:
         factor: What that does to the impulse: best estimate, lower and upper end.
         edges: What the edges of its wall and the angle of the wave do to the impulse of the curves.
         likely_pa_s: The best estimate of the impulse; what counts is on the safe side of it.
-        likely_peak_pa: That of the peak.
     """
 
     filled: FacadeBay
@@ -117,10 +115,7 @@ class ThreatScreening:
     """The worst place of one threat.
 
     Attributes:
-        name: Name of the threat.
         charge: The charge at its worst place by damage.
-        places: Number of its places.
-        bays: The bays.
     """
 
     name: str
@@ -181,8 +176,6 @@ class StandOff:
     """The distances from which a component allows the levels of protection.
 
     Attributes:
-        name: Name of the component.
-        component: The component.
         distances_m: Distance by level; infinite beyond the end of the curves.
         least_m: Least distance for which the response is valid; a distance equal to it may be less.
         most_m: Distance of the end of the curves.
@@ -386,7 +379,6 @@ class _Facade:
     """The bays of a site in the open air.
 
     Attributes:
-        bays: The bays.
         middles_m: Their middles, before the modules of oblique walls (bays, 3).
         outward: Their outward normals (bays, 3).
         ends_m: Distances of the middles from the ends of the wall on the right and on the left

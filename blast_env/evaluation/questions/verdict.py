@@ -99,7 +99,6 @@ class BuildingResponse:
     """The response of one building to one charge.
 
     Attributes:
-        building: Name of the building.
         charge: The charge at its place.
         on_cells: Response of its bays to the histories on the cells, which clip peaks.
         peak_factor: Factor on its peaks that corrects their clipping by cells.
@@ -182,7 +181,6 @@ class Neighbour:
     """A building without a facade under one charge.
 
     Attributes:
-        building: Name of the building.
         charge: The charge at its place.
         wall: Its most loaded wall.
         peak_pa: Side-on peak overpressure there.
@@ -219,7 +217,6 @@ class BuildingSummary(NamedTuple):
     Attributes:
         level: Level of protection in words, with that on the cells where it is higher.
         broken: Expected number of broken panes.
-        panes: Number of its panes.
         condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933; a dash
             without panes.
         failed: Number of wall panels with hazardous damage or worse.

@@ -97,9 +97,7 @@ class PlacedElement(NamedTuple):
     """A module or piece at its place.
 
     Attributes:
-        name: Its name.
         element: The element of the layout.
-        variant: Its variant.
         rectangle_m: Its plan.
         cost: Its cost there.
     """

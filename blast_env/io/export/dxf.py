@@ -127,10 +127,7 @@ class Text:
     """A text on the drawing: a name inside a structure or piece, a letter beside the others.
 
     Attributes:
-        text: The text.
-        feature: Its feature.
         centre_m: Its middle.
-        height_m: Height of the letters.
         upright: Whether it is turned by 90 degrees.
     """
 

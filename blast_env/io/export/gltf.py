@@ -33,7 +33,6 @@ class Mesh:
     """A body or surface.
 
     Attributes:
-        name: Its name.
         triangles_m: Corners of its triangles on the site, m (n, 3, 3), counterclockwise as they are
             seen from outside.
         colours: Colour of each triangle as on a screen, 0 to 1 (n, 3).

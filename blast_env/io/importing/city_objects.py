@@ -50,7 +50,6 @@ class CityGeometry:
     """The geometry of an object in one level of detail.
 
     Attributes:
-        lod: The level of detail.
         surfaces: Its surfaces, of solids the outer ones.
         lines: Its lines, each (n, 3).
         cavities: Number of the hollows of its solids.
@@ -89,7 +88,6 @@ class CityObject:
         kind: Its type, as `BuildingPart`.
         tags: Its attributes.
         parents: The ids of those of which it is a part.
-        geometries: Its geometries.
     """
 
     key: str

@@ -239,8 +239,6 @@ class _Drawn:
     """The entities of a drawing as features.
 
     Attributes:
-        site_map: The map of the drawing.
-        document: The drawing.
         skipped: Entities that a block has, but ezdxf cannot place, with the reason.
         faces: Places and corners of 3DFACEs by layer and insert; those that meet are a body.
     """

@@ -39,7 +39,6 @@ class HeightReader:
     """Reads the heights of the buildings of a map; unclear ones are on its ledger.
 
     Attributes:
-        site_map: The map.
         unit_m: Length of the unit of numbers without one, m.
         remark: The kind of guess that this unit is; an empty string if it is none.
     """

@@ -51,10 +51,8 @@ class Solid:
     """An element with a shape.
 
     Attributes:
-        element: The element.
         place: Its place in the file.
         is_post: Whether it is no part of a building, but may carry one or close a gap of its walls.
-        faces: Its faces.
     """
 
     element: Any
@@ -136,7 +134,6 @@ class Building:
         storeys_m: Heights of its storeys in the model, by the ids of their entities.
         placed_m: Height at which it is placed in the model.
         stated_m: Heights that the model states for the ground, with words on each.
-        options: Options of the import.
     """
 
     place: str

@@ -43,8 +43,6 @@ class SitePlacement:
     """A site on a map, with its objects in metres from the site's lower left corner.
 
     Attributes:
-        path: The file.
-        options: Options of the import.
         ledger: The ledger of the import.
         plane: The plane in which the map is measured.
         rotation_deg: From the plane's x axis to the site's, counterclockwise.

@@ -75,16 +75,12 @@ class SiteMap:
     """A map or drawing, to which its reader adds all objects.
 
     Attributes:
-        path: The file.
-        content: Its content.
-        options: Options of the import.
         ledger: The ledger of the import.
         crs: Reference system of its coordinates, as pyproj reads it; x is easting or longitude.
             `None` for a drawing, whose place on the Earth is unknown.
         unit_m: Length of the unit of a drawing, m.
         has_layers: Whether its objects have layers instead of tags.
         features: All outlines, lines and points; texts are points.
-        points: Number of their points.
     """
 
     path: Path

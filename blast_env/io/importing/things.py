@@ -36,7 +36,6 @@ class Thing:
     """An object of a map with a role in the site.
 
     Attributes:
-        role: Its role.
         geometry: Its outline, line or point, in the coordinates of the source.
         name: Its name in the source, or an empty string.
         place: Its place in the file.
@@ -102,7 +101,6 @@ class Selector:
     """Selects objects by a tag: `building`, `usage=school`, `Layer=A-WALL*`; or by a layer.
 
     Attributes:
-        key: Key of the tag.
         pattern: Pattern of its value with `*` and `?`, regardless of case; `None` for any value
             but `no`.
     """
