@@ -48,10 +48,6 @@ class Store:
         path: The file, as an absolute path.
         most_bytes: As given.
         damaged: Number of damaged entries that this object has found.
-
-    Raises:
-        BlastEnvError: If the file is damaged, is no store or cannot be opened, or `most_bytes` is
-            negative.
     """
 
     def __init__(self, path: str | Path, most_bytes: int | None = None) -> None:

@@ -134,9 +134,6 @@ class WorkFolder:
 
     Attributes:
         path: As given, absolute.
-
-    Raises:
-        BlastEnvError: If it cannot be created.
     """
 
     def __init__(self, path: str | Path) -> None:

@@ -83,9 +83,6 @@ class Entrance:
         port: Port to listen at.
         more_names: Further names under which the server answers, with a port or without.
         token: The secret of the printed address.
-
-    Raises:
-        BlastEnvError: If a name is invalid.
     """
 
     host: str = "127.0.0.1"

@@ -85,11 +85,7 @@ class Session:
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
-        """Return the session of a saved design.
-
-        Raises:
-            BlastEnvError: If it cannot be read.
-        """
+        """Return the session of a saved design."""
         session = cls(folder, work, workers, folder.load())
         settle(folder.jobs, workers)
         final = GasEngine().final([session.scenario])
@@ -100,11 +96,7 @@ class Session:
         return session
 
     def keep(self) -> None:
-        """Save cells, threats and view, with which the design is opened again.
-
-        Raises:
-            BlastEnvError: If they cannot be written.
-        """
+        """Save cells, threats and view, with which the design is opened again."""
         kept = DesignSettings(cells=self.cells, threats=self.threats, view=self.view)
         self.folder.keep_settings(kept)
 
@@ -145,22 +137,13 @@ class Session:
         self._set(self.history.then(label, design))
 
     def put_site(self, label: str, scenario: Scenario) -> tuple[str, ...]:
-        """Make a step to a changed site; return notes on the elements removed from layouts.
-
-        Raises:
-            BlastEnvError: As for `put`.
-        """
+        """Make a step to a changed site; return notes on the elements removed from layouts."""
         design, notes = self.design.with_scenario(scenario)
         self.put(label, design)
         return notes
 
     def harden(self, measure: str, *, taken: bool) -> None:
-        """Add a measure to the active layout, or remove it.
-
-        Raises:
-            LayoutError: If there is no such measure.
-            BlastEnvError: As for `put`.
-        """
+        """Add a measure to the active layout, or remove it."""
         own = Measure.named(measure)
         layout = tuple(element for element in self.design.layout if element != own)
         label = f"{'take' if taken else 'leave'} {measure}"
@@ -567,9 +550,5 @@ class Sessions:
             del self._open[design_id]
 
     def new(self, scenario: Scenario, label: str) -> Session:
-        """Return the session of a new design.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
+        """Return the session of a new design."""
         return self.of(self.work.create(scenario, label).design_id)

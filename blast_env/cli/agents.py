@@ -24,11 +24,7 @@ Digests = Mapping[str, str]
 
 
 def agent_without_blasts() -> tuple[Proposer, Digests]:
-    """Return the packaged agent as a proposer.
-
-    Raises:
-        MissingExtraError: If the extra `agents` is not installed.
-    """
+    """Return the packaged agent as a proposer."""
     from blast_env.surrogate import packaged_surrogate  # takes half a second to import
 
     with import_extra("agents", "packaged agent"):

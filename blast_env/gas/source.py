@@ -150,11 +150,7 @@ class GasCharge:
         return self.explosive.radius_m(self.free_air_kg)
 
     def profile(self, radius_m: float) -> "RadialProfile":
-        """Return the blast with its front at a radius, or up to 3 % before it.
-
-        Raises:
-            BlastEnvError: If the radius is within the charge.
-        """
+        """Return the blast with its front at a radius, or up to 3 % before it."""
         if not self.least_radius_m <= radius_m < inf:
             raise BlastEnvError(
                 f"the front of {self.mass_kg:g} kg is asked for at a radius of {radius_m:g} m, "

@@ -186,9 +186,6 @@ class SiteSheet(Sheet):
 
     Attributes:
         axes: Axes of the site, in metres.
-
-    Raises:
-        BlastEnvError: If the width is out of bounds.
     """
 
     def __init__(

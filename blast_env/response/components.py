@@ -159,11 +159,7 @@ def catalogue() -> dict[str, Glazing | Wall]:
 
 
 def find_component(name: str) -> Glazing | Wall:
-    """Return a component of the catalogue by name.
-
-    Raises:
-        UnknownNameError: If there is none; the message suggests the nearest one.
-    """
+    """Return a component of the catalogue by name."""
     known = catalogue()
     if name not in known:
         raise UnknownNameError("component", name, known)

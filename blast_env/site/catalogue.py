@@ -420,9 +420,6 @@ class Catalogue:
             given: (row, column), or with items (row, column, item, turned); `turned` is optional.
                 NumPy numbers are accepted, and arrays for cells.
             place: Its place in the layout, for the error.
-
-        Raises:
-            LayoutError: If it has another form.
         """
         if not self.has_items:
             return cell_from(given, place)
@@ -477,11 +474,7 @@ class Catalogue:
         return table
 
     def _elements_of(self, table: NDArray[np.integer]) -> tuple[Element, ...]:
-        """Return the elements of an array as by `table`.
-
-        Raises:
-            LayoutError: If it is none.
-        """
+        """Return the elements of an array as by `table`."""
         shape = (len(self.variants), *self.shape)
         if table.shape != shape or not np.isin(table, (0, 1)).all():
             raise LayoutError(

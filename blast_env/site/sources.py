@@ -68,11 +68,7 @@ class PointSource(ChargeSource):
 
     @classmethod
     def at(cls, charge: Charge) -> Self:
-        """Return the source of one charge.
-
-        Raises:
-            ValidationError: If the charge is out of bounds.
-        """
+        """Return the source of one charge."""
         return cls(position_m=charge.position_m, tnt_kg=charge.tnt_kg, height_m=charge.height_m)
 
     @property
@@ -202,11 +198,7 @@ AnyCharge = Charge | VehicleCharge
 
 
 def source_of(charge: AnyCharge) -> AnySource:
-    """Return the source of a single charge: a point, or the vehicle.
-
-    Raises:
-        ValidationError: If the charge is out of bounds.
-    """
+    """Return the source of a single charge: a point, or the vehicle."""
     return charge.source if isinstance(charge, VehicleCharge) else PointSource.at(charge)
 
 

@@ -72,9 +72,6 @@ class Visibility:
 
         Args:
             scenario: The scenario, or its bundled name or path.
-
-        Raises:
-            BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
         # (1) Lines from all places in all directions; (2) where each first meets a protected
@@ -256,9 +253,6 @@ class SiteMeasures:
 
         Args:
             scenario: The scenario, or its bundled name or path.
-
-        Raises:
-            BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
         lines, placement = Visibility.of(scenario), LayoutState.empty(scenario)
@@ -549,9 +543,6 @@ class VisibilityCriterion:
 
         Args:
             scenario: The scenario, or its bundled name or path.
-
-        Raises:
-            BlastEnvError: If it has no build zone.
         """
         shares = SiteMeasures.of(scenario)
         advantage = shares.layout_share - shares.random_share

@@ -149,11 +149,7 @@ class Session:
         )
 
     def rules(self) -> Proposals:
-        """Return what each rule of thumb proposes and costs, and a random layout.
-
-        Raises:
-            BlastEnvError: If the session has ended.
-        """
+        """Return what each rule of thumb proposes and costs, and a random layout."""
         self._check_open()
         words = "legal layouts, none of which was blasted"
         return Proposals(proposals=proposals_for(self._problem, self.seed), **self._common(words))

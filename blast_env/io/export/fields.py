@@ -94,9 +94,6 @@ class FieldSeries:
     Args:
         grid: The grid.
         most_times: Most times that are kept; at least half of them are, of a run of as many steps.
-
-    Raises:
-        BlastEnvError: If the number is out of bounds, or the series would be too large.
     """
 
     def __init__(self, grid: GasGrid, most_times: int = TIMES) -> None:
