@@ -12,11 +12,7 @@ from typing import Final, Literal
 from blast_env.bundled import ITEM_SITES
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.cases import (
-    fixed_charges,
-    one_per_charge,
-    search_set,
-)
+from blast_env.evaluation.cases import fixed_charges, one_per_charge, search_set
 from blast_env.layout.build_site import draw_threat
 from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
 from blast_env.sites import SITE_KINDS

@@ -14,13 +14,7 @@ import typer
 from blast_env.answers.document import percent
 from blast_env.answers.search import SearchRun, judged_answer, proposal_words, search_answer
 from blast_env.answers.terminal import print_line, print_parts
-from blast_env.cli.agents import (
-    AGENT,
-    SURROGATE,
-    Digests,
-    agent_without_blasts,
-    surrogate_search,
-)
+from blast_env.cli.agents import AGENT, SURROGATE, Digests, agent_without_blasts, surrogate_search
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     SCENARIO_HELP,

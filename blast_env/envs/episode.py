@@ -34,12 +34,7 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import (
-    Assessment,
-    BlastCounts,
-    BlastEvaluator,
-    loads_together,
-)
+from blast_env.evaluation.evaluator import Assessment, BlastCounts, BlastEvaluator, loads_together
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState

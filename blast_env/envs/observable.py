@@ -16,12 +16,7 @@ from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.batch import Placements
 from blast_env.layout.build_site import vehicle_reach, worst_places
-from blast_env.site import (
-    AnySource,
-    BuildZone,
-    Scenario,
-    VehicleSource,
-)
+from blast_env.site import AnySource, BuildZone, Scenario, VehicleSource
 from blast_env.site.zone import module_costs_of
 
 if TYPE_CHECKING:  # most sites have no vehicle

@@ -29,10 +29,7 @@ from blast_env.envs.observable import (
 from blast_env.envs.planes import GridObservation, ImageEpisode, ImageObservation
 from blast_env.errors import BlastEnvError
 from blast_env.layout.batch import Placements
-from blast_env.site import (
-    AnySource,
-    Scenario,
-)
+from blast_env.site import AnySource, Scenario
 from blast_env.site.zone import source_bounds_m
 
 MOST_STRUCTURES: Final = 8

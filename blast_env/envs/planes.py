@@ -27,12 +27,7 @@ from blast_env.envs.observable import (
 from blast_env.geometry import Rectangle
 from blast_env.layout.batch import Placements
 from blast_env.sections import PointM
-from blast_env.site import (
-    AnySource,
-    Catalogue,
-    RectangleSource,
-    Scenario,
-)
+from blast_env.site import AnySource, Catalogue, RectangleSource, Scenario
 from blast_env.site.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
 

@@ -9,10 +9,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Final, Self
 
-from blast_env.evaluation.cases import (
-    LoadCase,
-    LoadCaseSet,
-)
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.evaluation.engines.contract import BlastDrawing, EngineBlast
 from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts_digest

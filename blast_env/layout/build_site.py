@@ -8,12 +8,7 @@ import numpy as np
 
 from blast_env.geometry import Element, Layout, standing
 from blast_env.layout.placement import LayoutState, check_layout, usable_cells
-from blast_env.site import (
-    AnyCharge,
-    Scenario,
-    VehicleCharge,
-    VehicleSource,
-)
+from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
 from blast_env.site.structures import ConcreteSquareSection

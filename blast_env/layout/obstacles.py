@@ -11,14 +11,7 @@ from blast_env.geometry import Element, standing
 from blast_env.site.catalogue import Catalogue, element_text
 from blast_env.site.models import Scenario
 from blast_env.site.terraces import ground_below_m
-from blast_env.vehicles.crash_rating import (
-    NOTHING,
-    OTHER,
-    SOLID,
-    STOPS,
-    CrashPiece,
-    Obstacles,
-)
+from blast_env.vehicles.crash_rating import NOTHING, OTHER, SOLID, STOPS, CrashPiece, Obstacles
 
 
 def obstacles_of(scenario: Scenario, layout: Iterable[Element]) -> Obstacles:

@@ -33,13 +33,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.response.components import GlassKind, Glazing, Interlayer
 from blast_env.response.plate_table import WEIBULL_M, plate_curve
-from blast_env.response.sdof import (
-    STEPS_PER_PERIOD,
-    Resistance,
-    System,
-    check_histories,
-    impulses,
-)
+from blast_env.response.sdof import STEPS_PER_PERIOD, Resistance, System, check_histories, impulses
 
 YOUNG_PA: Final = 71.7e9
 """Young's modulus of glass, Pa (ASTM E1300)."""

@@ -17,10 +17,7 @@ from blast_env.site.parameters import for_charge
 from blast_env.site.sources import PlaceSource, VehicleSource
 from blast_env.site.structures import AnyStructure
 from blast_env.site.terraces import terrace_problems
-from blast_env.site.zone import (
-    distance_m,
-    source_bounds_m,
-)
+from blast_env.site.zone import distance_m, source_bounds_m
 from blast_env.site.zone_checks import build_zone_problems, outside_site, place_count_problems
 from blast_env.units import MODULE_SIDE_M
 

@@ -10,11 +10,7 @@ from functools import cached_property
 from typing import Any, Final, Self
 
 import numpy as np
-from pydantic import (
-    TypeAdapter,
-    ValidationError,
-    model_validator,
-)
+from pydantic import TypeAdapter, ValidationError, model_validator
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, Measure
@@ -36,9 +32,7 @@ from blast_env.site.sources import (
     ranked,
 )
 from blast_env.site.structures import PolygonSection
-from blast_env.site.zone import (
-    BuildZone,
-)
+from blast_env.site.zone import BuildZone
 from blast_env.units import MODULE_SIDE_M
 
 

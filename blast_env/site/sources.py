@@ -6,21 +6,10 @@ from math import hypot
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import (
-    Field,
-    StrictFloat,
-    model_validator,
-)
+from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.geometry import TOLERANCE_M
-from blast_env.sections import (
-    Coordinate,
-    Ground,
-    HashMark,
-    Name,
-    PointM,
-    Section,
-)
+from blast_env.sections import Coordinate, Ground, HashMark, Name, PointM, Section
 from blast_env.site.blast_site import Charge
 from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS, tnt_equivalent_kg
 from blast_env.vehicles.vehicle import Vehicle

@@ -3,21 +3,11 @@
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    StrictBool,
-    StrictFloat,
-    StrictInt,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.bays import BAY_M, STOREY_M, Bay
 from blast_env.geometry import Cell, Rectangle, Wall, WallName
-from blast_env.problems import (
-    Problem,
-    ScenarioError,
-)
+from blast_env.problems import Problem, ScenarioError
 from blast_env.response.components import PaneSide
 from blast_env.sections import (
     FOR_PEOPLE,

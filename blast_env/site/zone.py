@@ -8,12 +8,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    Field,
-    StrictFloat,
-    StrictInt,
-    model_validator,
-)
+from pydantic import Field, StrictFloat, StrictInt, model_validator
 
 from blast_env.arrays import BoolArray, FloatArray, any_in_windows, counts_before
 from blast_env.geometry import (

@@ -17,11 +17,7 @@ if TYPE_CHECKING:
         visibility_layout,
     )
     from blast_env.sites.generate import HELD_OUT_SITES, draw_site, generate_site
-    from blast_env.sites.headroom_sites import (
-        HEADROOM_HELD_OUT,
-        HEADROOM_TRAINING,
-        headroom_site,
-    )
+    from blast_env.sites.headroom_sites import HEADROOM_HELD_OUT, HEADROOM_TRAINING, headroom_site
     from blast_env.sites.item_sites import (
         CLOSE_SIDES_M,
         ITEM_KINDS,
@@ -39,12 +35,7 @@ if TYPE_CHECKING:
     )
     from blast_env.sites.module_sites import SiteRanges
     from blast_env.sites.ranges import Draws, ObstacleSpace, Ranges, draw_place
-    from blast_env.sites.source import (
-        FAMILIES,
-        SITE_KINDS,
-        SiteSource,
-        training_sites,
-    )
+    from blast_env.sites.source import FAMILIES, SITE_KINDS, SiteSource, training_sites
     from blast_env.sites.turning import turned
 else:
     __getattr__, __dir__ = on_first_use(__name__)

@@ -6,13 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
-from blast_env.atlas import (
-    Factors,
-    numbers_between,
-    numbers_of_echoes,
-    packaged_laws,
-    rows_between,
-)
+from blast_env.atlas import Factors, numbers_between, numbers_of_echoes, packaged_laws, rows_between
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from tests import builders

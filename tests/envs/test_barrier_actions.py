@@ -14,13 +14,7 @@ from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState, check_layout
 from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.catalogue_sites import WALL, yard
-from tests.envs.small import (
-    make,
-    restricted_scenario,
-    same,
-    small_document,
-    small_scenario,
-)
+from tests.envs.small import make, restricted_scenario, same, small_document, small_scenario
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 

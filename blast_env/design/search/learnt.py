@@ -11,12 +11,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.moves import Moves
-from blast_env.design.search.problem import (
-    Progress,
-    Report,
-    SamplingAgent,
-    SearchResult,
-)
+from blast_env.design.search.problem import Progress, Report, SamplingAgent, SearchResult
 from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet

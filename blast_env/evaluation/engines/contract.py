@@ -23,12 +23,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, valu
 from blast_env.evaluation.record import BlastLoads, BlastRecord
 from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
-from blast_env.site import (
-    AnyCharge,
-    AnyScenario,
-    Scenario,
-    find_scenario,
-)
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd

@@ -15,12 +15,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Fate, Ledger
-from blast_env.io.importing.options import (
-    MARGIN_M,
-    MOST_MARGIN_M,
-    MOST_SITE_M,
-    ImportOptions,
-)
+from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, MOST_SITE_M, ImportOptions
 from blast_env.io.importing.outlines import dominant_direction_deg, grid_offset_m
 from blast_env.io.importing.plane import Plane, plane_around, rotated
 from blast_env.io.importing.site_map import SiteMap
