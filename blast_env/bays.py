@@ -135,6 +135,9 @@ def divide(
         base_m: Height of its base above the ground.
         lines: The walls of a polygon; without them it is a block with four walls.
         storeys: Number of storeys of equal height, in the place of `storey_m`.
+
+    Raises:
+        BlastEnvError: If a size is not positive.
     """
     rise_m = height_m - base_m
     for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):

@@ -118,7 +118,12 @@ def write_text(path: str | Path, text: str) -> Path:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Provide a temporary folder, which is deleted when the block ends."""
+    """Provide a temporary folder, which is deleted when the block ends.
+
+    Raises:
+        BlastEnvError: If it cannot be made, or if the block raises `OSError`: the device is full,
+            for example.
+    """
     try:
         with TemporaryDirectory() as folder:
             yield Path(folder)

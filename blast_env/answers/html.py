@@ -90,7 +90,12 @@ def check_targets(html: str | Path, pdf: str | Path | None) -> None:
 
 
 def write_page(page: str, html: str | Path, pdf: str | Path | None = None) -> list[Path]:
-    """Write a page as a file and, if requested, as PDF; return the files."""
+    """Write a page as a file and, if requested, as PDF; return the files.
+
+    Raises:
+        BlastEnvError: If a suffix is wrong, a file cannot be written, or WeasyPrint lacks its
+            libraries; the page is written before the PDF.
+    """
     check_targets(html, pdf)
     write_text(html, page)
     if pdf is None:

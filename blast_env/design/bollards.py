@@ -43,6 +43,9 @@ def line_of_posts(
 
     Returns:
         The posts; none if no line increases the distance.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone or no vehicle.
     """
     return _line_on(_ById(find_scenario(scenario))).layout
 
@@ -59,6 +62,9 @@ def posts_and_wall(
     Args:
         scenario: As for `line_of_posts`.
         charge: As for `line_of_posts`.
+
+    Raises:
+        BlastEnvError: As for `line_of_posts`.
     """
     found = find_scenario(scenario)
     posts = _line_on(_ById(found))

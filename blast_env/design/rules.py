@@ -222,7 +222,11 @@ def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> 
 
 
 def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return a wall that bends around the charge, as near to it as the build zone allows."""
+    """Return a wall that bends around the charge, as near to it as the build zone allows.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
+    """
     placement = LayoutState.empty(scenario)
     (x_m, y_m), radius_m = _place_m(placement, charge), placement.scenario.charge_radius_m
     around = Rectangle(x_m, y_m, x_m, y_m).grown(radius_m)
@@ -233,6 +237,9 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
     """Return a wall around the protected structure nearest to a charge, as near as possible.
 
     It begins on the side of the charge and extends in both directions.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
     """
     placement = LayoutState.empty(scenario)
     protected = [
@@ -264,6 +271,9 @@ def hardening_alone(scenario: AnyScenario, charge: AnyCharge | None = None) -> L
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         charge: Ignored.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone.
     """
     found = find_scenario(scenario)
     placement, hardened = LayoutState.empty(found), set[tuple[str, str]]()
@@ -283,6 +293,9 @@ def hardening_and_sight_lines(scenario: AnyScenario, charge: AnyCharge | None = 
     Args:
         scenario: As for `hardening_alone`.
         charge: As for `sight_lines`.
+
+    Raises:
+        BlastEnvError: As for `sight_lines`.
     """
     placement = LayoutState(find_scenario(scenario), hardening_alone(scenario))
     for piece in sight_lines(scenario, charge):

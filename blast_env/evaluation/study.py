@@ -483,6 +483,10 @@ def run_study(
     Without given threats, charges at other places come first: the worst of them are the threats. An
     interruption (`KeyboardInterrupt`) after the threats with the coarser cells gives a study with
     the parts finished by then.
+
+    Raises:
+        BlastEnvError: If the layout is not legal, a charge is out of place, or a limit names no
+            building; all before the first blast.
     """
     options = options or StudyOptions(cells=final_cells(scenario))
     cells = check_layout(scenario, layout)

@@ -55,6 +55,9 @@ class GasGrid:
         z_high: Boundary at the high end of z.
         buffer_layers: Layers of growing cells beyond each open face; solids at the face extend
             through them, and the rest is air.
+
+    Raises:
+        BlastEnvError: If one of them is out of bounds.
     """
 
     cell_m: float

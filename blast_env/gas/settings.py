@@ -89,6 +89,9 @@ class GasSettings:
             structure ("structures"), on every wall and roof of the site ("walls"), or at the
             protected structures and every gauge ("gauges"); or the duration in seconds, also as
             text.
+
+    Raises:
+        BlastEnvError: If one of them is out of bounds.
     """
 
     cell_m: float = 0.5

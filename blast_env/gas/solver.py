@@ -186,6 +186,9 @@ class GasSolver:
             They are the fluxes of momentum, so that their integral is exactly the momentum taken
             up by the wall.
         extent: Cells of `state` outside which the air is still (z, y, 2); see `state.Extent`.
+
+    Raises:
+        BlastEnvError: If an argument is out of bounds.
     """
 
     def __init__(

@@ -150,7 +150,11 @@ class GasCharge:
         return self.explosive.radius_m(self.free_air_kg)
 
     def profile(self, radius_m: float) -> "RadialProfile":
-        """Return the blast with its front at a radius, or up to 3 % before it."""
+        """Return the blast with its front at a radius, or up to 3 % before it.
+
+        Raises:
+            BlastEnvError: If the radius is within the charge.
+        """
         if not self.least_radius_m <= radius_m < inf:
             raise BlastEnvError(
                 f"the front of {self.mass_kg:g} kg is asked for at a radius of {radius_m:g} m, "

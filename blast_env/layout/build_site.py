@@ -31,12 +31,20 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
 
 
 def draw_charge(scenario: Scenario, seed: int) -> Charge:
-    """Return the charge of a scenario for a seed: of a vehicle, at its place without a layout."""
+    """Return the charge of a scenario for a seed: of a vehicle, at its place without a layout.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
     return charge_against(scenario, (), draw_threat(scenario, seed))
 
 
 def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
-    """Return the charge of `draw_charge` before its place against a layout is determined."""
+    """Return the charge of `draw_charge` before its place against a layout is determined.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
     return scenario.sample_charge(random_streams(seed)[0])
 
 

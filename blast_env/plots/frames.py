@@ -66,6 +66,9 @@ class FramePainter:
     Attributes:
         sheet: The page of the frames.
         scale: The colour scale.
+
+    Raises:
+        BlastEnvError: If the width is out of bounds.
     """
 
     def __init__(

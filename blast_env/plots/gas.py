@@ -225,7 +225,11 @@ def _row_words(blast: GasBlast) -> str:
 
 
 def full_load(result: GasResult, structure: str, quantity: str) -> float:
-    """Return the end of the scale of `facades` for a structure, in Pa s or kPa."""
+    """Return the end of the scale of `facades` for a structure, in Pa s or kPa.
+
+    Raises:
+        UnknownNameError: If there is no such structure or quantity.
+    """
     kind, outline = kind_of(quantity), _walled(result, structure)
     return _full([{wall: _wall(result, outline, wall, kind) for wall in _LEFT_TO_RIGHT}])
 

@@ -96,7 +96,11 @@ class RigidPiece:
         )
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check the values.
+
+        Raises:
+            BlastEnvError: If one is out of bounds.
+        """
         # A piece without height, base or mass has no motion to compute.
         for name in ("height_m", "base_m", "mass_kg_m"):
             value = getattr(self, name)
@@ -147,6 +151,9 @@ def piece_responses(
     Args:
         time_s: Times of the histories, ascending (times,).
         pressure_pa: Mean pressure on one side less that on the other (pieces, times).
+
+    Raises:
+        BlastEnvError: If there is not one history per piece.
     """
     check_histories(len(pieces), time_s, pressure_pa)
     from blast_env.response.kernels import move_piece

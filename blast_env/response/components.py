@@ -159,7 +159,11 @@ def catalogue() -> dict[str, Glazing | Wall]:
 
 
 def find_component(name: str) -> Glazing | Wall:
-    """Return a component of the catalogue by name."""
+    """Return a component of the catalogue by name.
+
+    Raises:
+        UnknownNameError: If there is none; the message suggests the nearest one.
+    """
     known = catalogue()
     if name not in known:
         raise UnknownNameError("component", name, known)

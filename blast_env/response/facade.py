@@ -324,6 +324,9 @@ def respond(
     Args:
         time_s: Times of the histories, ascending: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
+
+    Raises:
+        BlastEnvError: If there is not one history per bay.
     """
     check_histories(len(bays), time_s, pressure_pa)
     glazed = [index for index, bay in enumerate(bays) if bay.glazing is not None]

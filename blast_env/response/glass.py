@@ -367,6 +367,9 @@ def glazing_responses(
         time_s: Times of the histories, ascending: (times,), or (panes, times) if they differ.
         pressure_pa: One history per pane, inwards positive (panes, times).
         limit_probability: Largest share of broken panes for the condition `NO_BREAK`.
+
+    Raises:
+        BlastEnvError: If there is not one history per pane.
     """
     check_histories(len(panes), time_s, pressure_pa)
     rows, impulse_pa_s = np.zeros((len(panes), 7)), impulses(time_s, pressure_pa)

@@ -32,7 +32,11 @@ class LevelOfProtection(IntEnum):
 
     @classmethod
     def named(cls, label: str) -> "LevelOfProtection":
-        """Return the level with a label; `BELOW_STANDARDS` is not allowed as a target."""
+        """Return the level with a label; `BELOW_STANDARDS` is not allowed as a target.
+
+        Raises:
+            UnknownNameError: If no level has that label; the message suggests the nearest one.
+        """
         levels = {cl.label: cl for cl in cls if cl is not cls.BELOW_STANDARDS}
         if label not in levels:
             raise UnknownNameError("level of protection", label, levels)

@@ -223,6 +223,9 @@ def panel_responses(
     Args:
         time_s: Times of the histories, ascending: (times,), or (panels, times) if they differ.
         pressure_pa: One history per panel, inwards positive (panels, times).
+
+    Raises:
+        BlastEnvError: If there is not one history per panel.
     """
     motion = responses([panel.system for panel in panels], time_s, pressure_pa)
     # Rebound outwards damages as deflection inwards does.

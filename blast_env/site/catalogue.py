@@ -420,6 +420,9 @@ class Catalogue:
             given: (row, column), or with items (row, column, item, turned); `turned` is optional.
                 NumPy numbers are accepted, and arrays for cells.
             place: Its place in the layout, for the error.
+
+        Raises:
+            LayoutError: If it has another form.
         """
         if not self.has_items:
             return cell_from(given, place)

@@ -51,6 +51,9 @@ class ConditionalValueAtRisk:
 
     Attributes:
         level: At least 0 (the mean of all) and below 1 (the worst one alone, in the limit).
+
+    Raises:
+        BlastEnvError: If the level is out of bounds.
     """
 
     level: float

@@ -318,6 +318,9 @@ def preset(name: str) -> SimulationParameters:
 
     Args:
         name: One of `PRESETS`.
+
+    Raises:
+        UnknownNameError: If there is no such preset; the message suggests the nearest one.
     """
     if name not in PRESETS:
         raise UnknownNameError("preset", name, PRESETS)

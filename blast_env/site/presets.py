@@ -46,7 +46,11 @@ TNT_EQUIVALENTS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 
 
 def tnt_equivalent_kg(mass_kg: float, explosive: str) -> float:
-    """Return the TNT-equivalent mass of an explosive, by the larger of both equivalents."""
+    """Return the TNT-equivalent mass of an explosive, by the larger of both equivalents.
+
+    Raises:
+        UnknownNameError: If there is no such explosive; the message suggests the nearest one.
+    """
     if explosive not in TNT_EQUIVALENTS:
         raise UnknownNameError("explosive", explosive, TNT_EQUIVALENTS)
     return mass_kg * max(TNT_EQUIVALENTS[explosive])
@@ -65,7 +69,12 @@ class MassPreset:
 
     @classmethod
     def parsed(cls, text: str) -> "MassPreset":
-        """Return the charge of a text: `car`, `truck=800`, `truck=800,anfo`."""
+        """Return the charge of a text: `car`, `truck=800`, `truck=800,anfo`.
+
+        Raises:
+            BlastEnvError: If the text has another form, or the mass is not above 0.
+            UnknownNameError: If there is no such preset or explosive.
+        """
         name, sign, rest = text.partition("=")
         if not sign:
             if name not in CHARGE_PRESETS:

@@ -57,7 +57,11 @@ class PointSource(ChargeSource):
 
     @classmethod
     def at(cls, charge: Charge) -> Self:
-        """Return the source of one charge."""
+        """Return the source of one charge.
+
+        Raises:
+            ValidationError: If the charge is out of bounds.
+        """
         return cls(position_m=charge.position_m, tnt_kg=charge.tnt_kg, height_m=charge.height_m)
 
     @property

@@ -72,6 +72,9 @@ class Visibility:
 
         Args:
             scenario: The scenario, or its bundled name or path.
+
+        Raises:
+            BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
         # (1) Lines from all places in all directions; (2) where each first meets a protected
@@ -253,6 +256,9 @@ class SiteMeasures:
 
         Args:
             scenario: The scenario, or its bundled name or path.
+
+        Raises:
+            BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
         lines, placement = Visibility.of(scenario), LayoutState.empty(scenario)
@@ -543,6 +549,9 @@ class VisibilityCriterion:
 
         Args:
             scenario: The scenario, or its bundled name or path.
+
+        Raises:
+            BlastEnvError: If it has no build zone.
         """
         shares = SiteMeasures.of(scenario)
         advantage = shares.layout_share - shares.random_share

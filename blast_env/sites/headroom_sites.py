@@ -31,6 +31,9 @@ def headroom_site(seed: int) -> Scenario:
 
     Args:
         seed: Its place in `HEADROOM_HELD_OUT`, or 10,000 more than that in `HEADROOM_TRAINING`.
+
+    Raises:
+        BlastEnvError: If the seed is out of bounds.
     """
     for first, sites in ((0, HEADROOM_HELD_OUT), (HELD_OUT_SITES, HEADROOM_TRAINING)):
         if first <= seed < first + len(sites):

@@ -214,6 +214,9 @@ def close_ranges(side_m: float) -> ItemSiteRanges:
 
     Args:
         side_m: Width and height of the site, 16 to 24 m in whole modules.
+
+    Raises:
+        BlastEnvError: If the side is out of bounds.
     """
     _check_side(side_m, CLOSE_SIDES_M)
     return ItemSiteRanges(
@@ -242,6 +245,9 @@ def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
 
     Args:
         side_m: Width and height of the site, 40 to 100 m in whole modules.
+
+    Raises:
+        BlastEnvError: If the side is out of bounds.
     """
     _check_side(side_m, _LARGE_SIDES_M)
     return ItemSiteRanges(

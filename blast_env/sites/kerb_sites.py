@@ -182,6 +182,9 @@ def kerb_site(seed: int) -> Scenario:
 
     Args:
         seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
     """
     draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M))))
     across_m, along_m = draws.length_m(ACROSS_M), draws.length_m(ALONG_M)
@@ -195,6 +198,9 @@ def street_site(seed: int) -> Scenario:
 
     Args:
         seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
     """
     draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 1)))
     across_m, along_m = draws.length_m(STREET_ACROSS_M), draws.length_m(STREET_ALONG_M)
@@ -217,6 +223,9 @@ def court_site(seed: int) -> Scenario:
 
     Args:
         seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
     """
     draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 2)))
     across_m, along_m = draws.length_m(COURT_ACROSS_M), draws.length_m(COURT_ALONG_M)
@@ -242,6 +251,9 @@ def square_site(seed: int) -> Scenario:
 
     Args:
         seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
     """
     draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 3)))
     across_m, along_m = draws.length_m(SQUARE_ACROSS_M), draws.length_m(SQUARE_ALONG_M)

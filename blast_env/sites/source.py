@@ -57,6 +57,9 @@ class SiteSource:
     Attributes:
         count: Number of sites, at least 1.
         criterion: Acceptance criterion; the family's default unless given.
+
+    Raises:
+        BlastEnvError: If a seed or the count is out of bounds.
     """
 
     first_seed: int
@@ -80,6 +83,9 @@ class SiteSource:
 
         Args:
             count: Number of sites; small numbers serve to study generalisation.
+
+        Raises:
+            BlastEnvError: If the count is out of bounds.
         """
         return cls(HELD_OUT_SITES, count, ranges)
 
@@ -89,6 +95,9 @@ class SiteSource:
 
         Args:
             count: Number of sites, at most 10,000.
+
+        Raises:
+            BlastEnvError: If the count is out of bounds.
         """
         if count > HELD_OUT_SITES:
             raise BlastEnvError(f"count is {count}, must be at most {HELD_OUT_SITES}")
@@ -106,7 +115,11 @@ class SiteSource:
         return self.site(0)
 
     def sample(self, rng: np.random.Generator) -> Scenario:
-        """Draw a site uniformly with `rng`."""
+        """Draw a site uniformly with `rng`.
+
+        Raises:
+            BlastEnvError: As `generate_site`.
+        """
         return self.site(int(rng.integers(self.count)))
 
     def site(self, index: int) -> Scenario:

@@ -149,7 +149,11 @@ class Session:
         )
 
     def rules(self) -> Proposals:
-        """Return what each rule of thumb proposes and costs, and a random layout."""
+        """Return what each rule of thumb proposes and costs, and a random layout.
+
+        Raises:
+            BlastEnvError: If the session has ended.
+        """
         self._check_open()
         words = "legal layouts, none of which was blasted"
         return Proposals(proposals=proposals_for(self._problem, self.seed), **self._common(words))

@@ -52,6 +52,9 @@ class Sessions:
 
         Args:
             episode: The fields of `Episode`.
+
+        Raises:
+            BlastEnvError: As `Tasks.begin`.
         """
         asked = Episode(**episode)
         name, session = secrets.token_hex(_NAME_BYTES), self._begin(asked)
@@ -66,7 +69,11 @@ class Sessions:
         )
 
     def named(self, name: str) -> Session:
-        """Return a session by its name; the first one's is empty."""
+        """Return a session by its name; the first one's is empty.
+
+        Raises:
+            BlastEnvError: If there is no such session.
+        """
         with self._lock:
             if name == "" and name not in self._kept:
                 self._keep(name, self._begin(self._first))

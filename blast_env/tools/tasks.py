@@ -55,7 +55,11 @@ class Tasks:
             secret_sites(self.secret, 1)
 
     def count(self, split: str) -> int:
-        """Return the number of problems of a split."""
+        """Return the number of problems of a split.
+
+        Raises:
+            UnknownNameError: If there is no such split.
+        """
         if split not in SPLITS:
             raise UnknownNameError("split", split, SPLITS)
         own = {"train": _TRAINING, "test": _SECRET if self.secret else 0}

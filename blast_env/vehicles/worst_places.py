@@ -187,7 +187,11 @@ def least_distances_m(walls: Iterable[Wall], places_m: FloatArray) -> FloatArray
 
 
 def nearest_point_m(walls: Iterable[Wall], position_m: PointM) -> PointM:
-    """Return the point of the loaded walls nearest to a place."""
+    """Return the point of the loaded walls nearest to a place.
+
+    Raises:
+        ValueError: If there is none.
+    """
     x_m, y_m = position_m
     points = [_nearest_m(wall, position_m) for wall in walls]
     return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))

@@ -116,6 +116,9 @@ def as_tensors(rows: "pd.DataFrame") -> tuple[Any, Any]:
         Inputs (rows, 6): x, y, height of the charge in m, its mass in kg, impulse in Pa s and peak
         in Pa without a barrier; and outputs (rows, 2): remaining shares of impulse and peak.
         Rows without a bare load are left out.
+
+    Raises:
+        MissingExtraError: If torch is not installed.
     """
     with import_extra("agents", "tensors"):
         import torch

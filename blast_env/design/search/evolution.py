@@ -69,7 +69,11 @@ class GeneticSearch(Search):
     name: str = "genetic"
 
     def explore(self, session: SearchSession) -> None:
-        """Draw a population, and let it evolve."""
+        """Draw a population, and let it evolve.
+
+        Raises:
+            MissingExtraError: If the extra `search` is not installed.
+        """
         # Here, because the other methods need no extra.
         from blast_env.design.search.operators import GA, evolve, operators
 
@@ -125,7 +129,11 @@ class Nsga2Search(Search):
     has_front: ClassVar[bool] = True
 
     def explore(self, session: SearchSession) -> None:
-        """Draw a population, and let it evolve."""
+        """Draw a population, and let it evolve.
+
+        Raises:
+            MissingExtraError: If the extra `search` is not installed.
+        """
         # Here, because the other methods need no extra.
         from blast_env.design.search.operators import NSGA2, evolve, operators
 

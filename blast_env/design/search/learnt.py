@@ -56,7 +56,11 @@ class Guesses:
 
     @classmethod
     def of(cls, surrogate: Surrogate, case: LoadCaseSet) -> "Guesses":
-        """Return an empty cache."""
+        """Return an empty cache.
+
+        Raises:
+            BlastEnvError: If no structure is protected.
+        """
         return cls(surrogate, case, site_of(case.scenario))
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
@@ -171,7 +175,11 @@ class SurrogateSearch(Search):
     def propose(
         self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the best layout by blasts or, with a budget of 0, by predictions."""
+        """Return the best layout by blasts or, with a budget of 0, by predictions.
+
+        Raises:
+            BlastEnvError: If no structure is protected.
+        """
         if budget:
             return super().propose(problem, budget, seed, report)
 
@@ -195,6 +203,9 @@ class SurrogateSearch(Search):
             charge: The charge, if it is known; otherwise the layout is for some of the charges of
                 the scenario.
             tell: Called with the share that is done.
+
+        Raises:
+            BlastEnvError: As for `propose`.
         """
         if self.surrogate is None:
             return tuple(sorted(_given(self.agent).propose(scenario, charge)))

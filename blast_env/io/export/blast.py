@@ -155,7 +155,11 @@ def export_blast(result: "GasResult", target: Path) -> list[Path]:
 
 
 def check_blast_target(target: Path) -> None:
-    """Refuse an unusable target of `export_blast` before the blast."""
+    """Refuse an unusable target of `export_blast` before the blast.
+
+    Raises:
+        BlastEnvError: If the suffix is unknown.
+    """
     suffix = target.suffix.lower()
     if suffix and suffix not in _WRITERS and not target.is_dir():
         raise BlastEnvError(

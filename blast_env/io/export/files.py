@@ -196,6 +196,9 @@ def export_to(plan: LayoutPlan, target: str | Path) -> list[Path]:
 
     Returns:
         The files.
+
+    Raises:
+        BlastEnvError: As for `export_layout`.
     """
     target = Path(target)
     check_target(target)
