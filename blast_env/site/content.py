@@ -1,12 +1,13 @@
 """The content of a scenario file: all its sections, without the checks between them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.geometry import Element, Rectangle, Wall
+from blast_env.problems import Problem, extent
 from blast_env.response.components import Component
 from blast_env.sections import (
     FOR_PEOPLE,
@@ -177,3 +178,12 @@ class Content(Section):
             rated,
             self.charge_radius_m,
         )
+
+
+def outside_site(
+    scenario: Content, key: str, description: str, rectangle: Rectangle
+) -> Iterator[Problem]:
+    """Yield a problem if a rectangle is not inside the site."""
+    if not scenario.site.rectangle_m.contains(rectangle):
+        site = extent(scenario.site.rectangle_m)
+        yield Problem(key, f"{description} must lie inside the site ({site})")

@@ -9,10 +9,9 @@ from blast_env.arrays import BoolArray
 from blast_env.geometry import TOLERANCE_M, stacked_runs
 from blast_env.problems import Problem, extent
 from blast_env.sections import Ground, PointM, Site
-from blast_env.site.content import Content
+from blast_env.site.content import Content, outside_site
 from blast_env.site.sources import VehicleSource
 from blast_env.site.zone import BuildZone, EmptyZone, empty_zone
-from blast_env.site.zone_checks import outside_site
 from blast_env.vehicles.crash_rating import Obstacles
 from blast_env.vehicles.drive import VehicleGround
 from blast_env.vehicles.driving import places_shape

@@ -137,7 +137,7 @@ class BuildZone(Section):
         pieces = sum(map(_pieces_of, items))
         for measures in (given.get("hardening"), given.get("removable")):
             pieces += len(measures) if isinstance(measures, list | tuple) else 0
-        # `build_zone_problems` reports an empty catalogue.
+        # `check_sections` reports an empty catalogue.
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
 
     def priced(self, cost: float) -> str:
