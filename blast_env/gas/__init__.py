@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         LoadTable,
         PatchHistories,
         Snapshots,
-        positive_phases,
     )
     from blast_env.gas.settings import CELLS, CHECKED_CELLS, Cells, GasSettings
     from blast_env.gas.solver import AIR_DENSITY_KG_M3, Burning, Gas, GasSolver, Settling
@@ -72,7 +71,6 @@ __all__ = [
     "largest_radius_m",
     "lay",
     "least_clearance_m",
-    "positive_phases",
     "set_charge",
     "shape_to_double",
     "stepped_buildings",

@@ -5,7 +5,6 @@ overpressure since the detonation, suction included. For a single pulse it is th
 and Bulmash; for several pulses it is the largest value of the impulse history, which shock codes
 print. Later pulses count only where they raise the history above its previous maximum. The sum of
 all positive phases grows with every echo during a run, and is no measure of the load on a wall.
-`positive_phases` returns that sum and the first phase of a history.
 
 On a wall, the pressure in a step is the momentum that the wall took from the gas, the flux that
 turned the gas round. No estimate from cells is exact in that sense: the pressure of the cell before
@@ -16,7 +15,7 @@ its cell.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,50 +208,6 @@ class PatchHistories:
     def history_pa(self) -> NDArray[np.float32]:
         """Mean overpressures of the steps, Pa (patches, steps)."""
         return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
-
-
-class Phases(NamedTuple):
-    """Impulses of the phases of a history, Pa s.
-
-    Attributes:
-        first_pa_s: Impulse of the first positive phase.
-        positive_pa_s: Sum over all positive phases.
-        negative_pa_s: Sum over all negative phases, 0 or below.
-        first_end_s: End of the first positive phase; the last time if it has not ended.
-    """
-
-    first_pa_s: float
-    positive_pa_s: float
-    negative_pa_s: float
-    first_end_s: float
-
-
-def positive_phases(
-    time_s: NDArray[np.float64],
-    overpressure_pa: NDArray[np.float64],
-    arrival_pa: float = ARRIVAL_PA,
-) -> Phases:
-    """Return the impulses of the phases of one history, for comparison with other codes.
-
-    Args:
-        time_s: Times (steps,).
-        overpressure_pa: Overpressures at these times (steps,).
-        arrival_pa: Overpressure at which a wave has arrived.
-    """
-    # Trapezoids. The first phase ends where the overpressure first falls to 0 after the arrival, as
-    # t_o of an ideal blast wave does (UFC 3-340-02, figure 2-2).
-    parts = np.diff(time_s) * 0.5 * (overpressure_pa[1:] + overpressure_pa[:-1])
-    arrived = np.flatnonzero(overpressure_pa >= arrival_pa)
-    after = np.flatnonzero(overpressure_pa <= 0.0)
-    end = len(time_s) - 1
-    if len(arrived):
-        end = int(min(after[after > arrived[0]], default=end))
-    return Phases(
-        float(np.maximum(parts[:end], 0.0).sum()),
-        float(np.maximum(parts, 0.0).sum()),
-        float(np.minimum(parts, 0.0).sum()),
-        float(time_s[end]),
-    )
 
 
 class Gauges(LoadTable):

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
         BuildingDamage,
         building_damage_probability,
         eardrum_peak_pa,
-        eardrum_rupture_probability,
         ground_thresholds,
         level_of_protection,
     )
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
         Interlayer,
         Wall,
         catalogue,
-        find_component,
     )
     from blast_env.response.damage import (
         TriangularLoads,
@@ -102,9 +100,7 @@ __all__ = [
     "damage_numbers",
     "divide",
     "eardrum_peak_pa",
-    "eardrum_rupture_probability",
     "fails_from",
-    "find_component",
     "flight_condition",
     "force_words",
     "glazing_responses",

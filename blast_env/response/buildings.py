@@ -63,12 +63,6 @@ def building_damage_probability(
         return _probability(5.0 - probit.share * np.log(demand))
 
 
-def eardrum_rupture_probability(peak_pa: FloatArray) -> FloatArray:
-    """Return the probability of eardrum rupture at side-on peak overpressures in Pa (places,)."""
-    with np.errstate(divide="ignore"):
-        return _probability(-15.6 + 1.93 * np.log(np.asarray(peak_pa)))
-
-
 def eardrum_peak_pa(probability: float) -> float:
     """Return the side-on peak overpressure for a probability of eardrum rupture, Pa."""
     from scipy.special import ndtri

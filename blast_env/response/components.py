@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from blast_env.bays import Bay
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.response.wall_sections import Masonry, ReinforcedConcrete, Sheeting, Supports
 from blast_env.sections import HashMark
 from blast_env.values import plain_text
@@ -156,18 +156,6 @@ def catalogue() -> dict[str, Glazing | Wall]:
         return _READ.validate_python(tomllib.loads(text))
     except ValidationError as error:
         raise BlastEnvError(f"components.toml: {error}") from None
-
-
-def find_component(name: str) -> Glazing | Wall:
-    """Return a component of the catalogue by name.
-
-    Raises:
-        UnknownNameError: If there is none; the message suggests the nearest one.
-    """
-    known = catalogue()
-    if name not in known:
-        raise UnknownNameError("component", name, known)
-    return known[name]
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
 from blast_env.parquet import checked_table, write_table
 from blast_env.particles import COLLISION_COLUMNS
-from blast_env.response import find_component, respond
+from blast_env.response import catalogue, respond
 from blast_env.site import Scenario, ScenarioError, save_scenario
 from blast_env.store import Store
 from blast_env.tables import markdown_table
@@ -176,7 +176,7 @@ TEXTS: Final = (
 
 USED: Final = ("window_laminated_12", "concrete_200", "brick_215", "steel_stud")
 COMPONENTS: Final[Document] = {
-    name: find_component(name).model_dump(mode="json", exclude_none=True) for name in USED
+    name: catalogue()[name].model_dump(mode="json", exclude_none=True) for name in USED
 }
 
 

@@ -25,7 +25,6 @@ from blast_env.gas import (
     Snapshots,
     exposed_faces,
     ground_faces,
-    positive_phases,
 )
 from tests.gas.flows import all_faces, blast, face_loads, recorder, street
 
@@ -77,17 +76,6 @@ def test_impulses_of_whole_histories_are_those_of_the_recorder(
     assert table.net_impulse_pa_s[0] <= table.impulse_pa_s[0]
     positive = step_s * np.maximum(history_pa, 0.0).sum()
     assert table.impulse_pa_s[0] <= positive + 1e-9 * scale
-
-
-def test_phases_of_a_history_by_hand() -> None:
-    time_s = STEP_S * np.arange(1.0, len(HISTORY_PA) + 1.0)
-    found = positive_phases(time_s, HISTORY_PA, arrival_pa=100.0)
-    assert found.first_pa_s == pytest.approx(0.025 + 0.15 + 0.325 + 0.25 + 0.025)
-    assert found.first_end_s == pytest.approx(6e-3)
-    assert found.positive_pa_s - found.first_pa_s == pytest.approx(0.005 + 0.265 + 0.25)
-    assert found.negative_pa_s == pytest.approx(-0.035)
-    still = positive_phases(time_s, 0.0 * HISTORY_PA)
-    assert still == (0.0, 0.0, 0.0, time_s[-1])
 
 
 def test_values_at_the_ends_of_steps_are_joined_by_lines() -> None:

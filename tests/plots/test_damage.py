@@ -23,7 +23,7 @@ from blast_env.response import (
     FacadeResponse,
     Glazing,
     LevelOfProtection,
-    find_component,
+    catalogue,
     ground_thresholds,
     respond,
 )
@@ -73,7 +73,7 @@ def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> 
 
 def test_a_bay_with_better_glass_is_in_the_diagram_of_that_glass(site: Scenario) -> None:
     """Its point among the regions of the old glass would say that it fails."""
-    better = find_component("window_laminated_12")
+    better = catalogue()["window_laminated_12"]
     assert isinstance(better, Glazing)
     unprotected = response(site, 4e4)
     bays = [replace(bay, glazing=better) for bay in site.bays]
@@ -99,7 +99,7 @@ def test_worse_levels_begin_at_larger_impulses_and_thicker_glass_holds_more() ->
     peaks = np.array([2e3, 1e4, 1e5])
     thin, thick = (
         level_bounds((component, 0.0), peaks, (1.0, 1e4))
-        for component in map(find_component, ("window_annealed_4", "window_annealed_6"))
+        for component in map(catalogue().get, ("window_annealed_4", "window_annealed_6"))
         if isinstance(component, Glazing)
     )
     ordered = np.array(list(thick.values()))

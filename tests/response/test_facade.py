@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.response import (
     Bay,
@@ -18,7 +18,6 @@ from blast_env.response import (
     assumption_words,
     catalogue,
     divide,
-    find_component,
     force_words,
     pane_of,
     panel_of,
@@ -60,23 +59,18 @@ def test_every_component_of_the_catalogue_says_its_source_and_makes_a_system() -
             assert 0.005 < panel_of(component, 3.0).system.period_s < 0.5
 
 
-def test_unknown_components_name_the_nearest() -> None:
-    with pytest.raises(UnknownNameError, match="window_annealed_6"):
-        find_component("window_anealed_6")
-
-
 def bay(width_m: float = 3.0) -> Bay:
     return Bay("office", "west", 1, 1, 0.0, width_m, 0.0, 3.5)
 
 
 def glazing(name: str) -> Glazing:
-    found = find_component(name)
+    found = catalogue()[name]
     assert isinstance(found, Glazing)
     return found
 
 
 def wall(name: str) -> Wall:
-    found = find_component(name)
+    found = catalogue()[name]
     assert isinstance(found, Wall)
     return found
 

@@ -104,15 +104,6 @@ class SearchResult:
         """The predicted gain as text; empty without a prediction."""
         return "" if self.gain is None else f"expected reduction {100.0 * self.gain:.1f} %"
 
-    def best_at(self, blasts: int) -> Candidate | None:
-        """Return the best layout after a number of blasts, or `None` if there was none yet.
-
-        A search plans for its whole budget. Its best layout after part of the budget is worse than
-        that of a search with the smaller budget.
-        """
-        by_then = [step for step in self.history if step.blasts <= blasts]
-        return by_then[-1] if by_then else None
-
     def history_table(self) -> "pd.DataFrame":
         """Return one row per change of the best layout."""
         return _table(self.history)
