@@ -5,9 +5,7 @@ import re
 import subprocess
 import tarfile
 import zipfile
-from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,12 +15,9 @@ import numpy as np
 import pytest
 import shapely
 from ezdxf import units
-from hypothesis import given
-from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, named
 from blast_env.io.importing import (
-    FATES,
     Fate,
     ImportOptions,
     Ledger,
@@ -177,8 +172,6 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("tags", "height_m", "words"),
     [
-        ({"height": "29'6\""}, 9.0, None),
-        ({"height": "29 ft 6 in"}, 9.0, None),
         ({"height": "about 9", "building:levels": "3"}, 9.0, "cannot be read"),
         ({"building:levels": "2;3"}, 9.0, "several numbers"),
         ({"building:levels": "3-4"}, 12.0, "several numbers"),
@@ -658,58 +651,6 @@ def test_notes_in_a_scenario_name_as_many_objects_as_there_is_room() -> None:
     assert note.endswith(" more)")
 
 
-KINDS = st.sampled_from(
-    [
-        {"building": "yes"},
-        {"building": "roof"},
-        {"building": "house", "height": "tall"},
-        {"building": "yes", "layer": "-1"},
-        {"building:part": "yes", "height": "9"},
-        {"highway": "service"},
-        {"highway": "steps"},
-        {"amenity": "parking"},
-        {"barrier": "wall"},
-        {"natural": "tree"},
-        {"kind": "keep_out"},
-        {"kind": "charge_place"},
-        {},
-    ]
-)
-SHAPES = st.tuples(
-    st.sampled_from(["Polygon", "LineString", "Point", None]),
-    st.integers(-8, 40),
-    st.integers(-8, 40),
-    st.integers(1, 12),
-)
-
-
-def shaped(shape: tuple[str | None, int, int, int], tags: dict[str, str]) -> dict[str, Any]:
-    kind, x, y, side = shape
-    ring = [[x, y], [x + side, y], [x + side, y + side], [x, y + side], [x, y]]
-    coordinates: Any = {"Polygon": [ring], "LineString": ring[:3], "Point": [x, y]}
-    geometry = None if kind is None else {"type": kind, "coordinates": coordinates[kind]}
-    return {"type": "Feature", "properties": tags, "geometry": geometry}
-
-
-@given(st.lists(st.tuples(SHAPES, KINDS), max_size=12), st.booleans())
-def test_every_object_is_on_the_ledger_or_on_the_site(
-    tmp_path_factory: pytest.TempPathFactory,
-    drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
-    cut: bool,
-) -> None:
-    """Each object is read or has a reason; what is read as a building stands on the site."""
-    house = outline(rectangle(50, 0, 8, 6), name="House", height=6.0, protected=True)
-    features = [house, charge(64.0, 3.0), *(shaped(*shape) for shape in drawn)]
-    path = written(tmp_path_factory.mktemp("maps"), *features)
-    part: dict[str, Any] = {"origin": (20.0, -5.0), "size_m": (50.0, 30.0)} if cut else {}
-    site = imported(path, protect=("House",), **part)
-    fates = Counter(entry.place for entry in site.ledger.of(*FATES))
-    assert fates == Counter(f"features[{k}]" for k in range(len(features)))
-    read = {entry.place for entry in site.ledger.of(Fate.READ) if entry.kind == "building"}
-    assert read == {building.place for building in site.buildings}
-    assert not entries(site, Fate.LEFT_OUT, "of no use")
-
-
 def test_a_folder_of_files_has_the_sums_of_their_ledgers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -789,41 +730,3 @@ def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> 
         "way 3": 30.0,
         "way 4": 6.0,
     }
-
-
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(["closed", "open", "line", "circle", "point", "text", "ray", "mesh"]),
-            st.integers(-20, 20),
-            st.integers(10, 40),
-            st.integers(1, 6),
-            st.sampled_from(["HOUSES", "TREES"]),
-        ),
-        max_size=10,
-    )
-)
-def test_every_entity_of_a_drawing_is_on_the_ledger(
-    tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple[str, int, int, int, str]]
-) -> None:
-    path, document = drawing(tmp_path_factory.mktemp("drawings"))
-    space = document.modelspace()
-    house_at(space, 0)
-    handles = []
-    for kind, x, y, side, layer in drawn:
-        of, ring = of_layer(layer), rectangle(x, y, side, side)
-        make = {
-            "closed": partial(space.add_lwpolyline, ring, close=True, dxfattribs=of),
-            "open": partial(space.add_lwpolyline, ring[:3], dxfattribs=of),
-            "line": partial(space.add_line, (x, y), (x + side, y), dxfattribs=of),
-            "circle": partial(space.add_circle, (x, y), side, dxfattribs=of),
-            "point": partial(space.add_point, (x, y), dxfattribs=of),
-            "text": partial(space.add_text, "A", dxfattribs=of),
-            "ray": partial(space.add_ray, (x, y), (1.0, 0.0), dxfattribs=of),
-            "mesh": partial(space.add_3dface, [(a, b, 0.0) for a, b in ring], dxfattribs=of),
-        }
-        handles.append(make[kind]().dxf.handle)
-    document.saveas(path)
-    site = imported(path, **DRAWN)
-    fates = Counter(entry.place.split()[1] for entry in site.ledger.of(*FATES))
-    assert fates == Counter([space[0].dxf.handle, *handles])
