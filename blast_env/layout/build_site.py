@@ -147,7 +147,8 @@ def _check_clear(scenario: Scenario, layout: Layout) -> None:
 def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
     """Return the outlines of the structures that remain with a layout."""
     zone = scenario.build_zone
-    may_go = frozenset[str]() if zone is None else zone.may_be_taken_away
+    removable = () if zone is None else zone.removable
+    may_go = frozenset[str]().union(*[removal.structures for removal in removable])
     found = []
     for section in scenario.structures_with(layout):
         is_square = isinstance(section, ConcreteSquareSection)

@@ -91,7 +91,11 @@ def build_scene(
     if any(structure.base_m or structure.carries for structure in scenario.structures):
         scenario.check_for_particles()
     _check_not_over_a_roof(scenario, base.charge)
-    parameters = _parameters_for(scenario, base.charge)
+    try:
+        parameters = for_charge(scenario.parameters, base.charge.tnt_kg)
+    except BlastEnvError as error:
+        message = f"{scenario.name}: charge: {error}; engine 'gas' takes this charge"
+        raise BlastEnvError(message) from error
     # Separate streams for charge, fan and air: a barrier or another fan leaves the air as it is.
     _, fan_rng, air_rng = random_streams(seed)
     centre = in_units(base.charge.position_m)
@@ -113,16 +117,6 @@ def build_scene(
         air_height_m=base.air_height_m,
         parameters=parameters,
     )
-
-
-def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParameters:
-    """Return the particles' parameters for a charge, whose mass has bounds."""
-    try:
-        return for_charge(scenario.parameters, charge.tnt_kg)
-    except BlastEnvError as error:
-        raise BlastEnvError(
-            f"{scenario.name}: charge: {error}; engine 'gas' takes this charge"
-        ) from error
 
 
 def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:

@@ -109,9 +109,10 @@ class Content(Section):
 
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that remain with a layout."""
-        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
-        if not away:
+        zone = self.build_zone
+        if zone is None or not zone.removable:
             return self.structures
+        away = zone.taken_away(layout)
         return tuple(structure for structure in self.structures if structure.name not in away)
 
     @property

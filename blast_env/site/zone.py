@@ -163,16 +163,9 @@ class BuildZone(Section):
 
     def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
         """Return the names of the structures that a layout removes."""
-        if not self.removable:
-            return frozenset()
         taken = {element.item for element in layout if isinstance(element, Removal)}
         own = (removal.structures for removal in self.removable if removal.name in taken)
         return frozenset().union(*own)
-
-    @property
-    def may_be_taken_away(self) -> frozenset[str]:
-        """The names of the structures that a layout can remove."""
-        return frozenset().union(*(removal.structures for removal in self.removable))
 
     def modules(self, layout: Iterable[Element]) -> tuple[ModulePlace, ...]:
         """Return the modules of a layout, piece by piece.
