@@ -11,7 +11,8 @@ from blast_env.geometry import TOLERANCE_M, Element, Rectangle
 from blast_env.layout.build_site import build_site, random_streams
 from blast_env.particles.balls import Balls, air_lattice, explosion_fan
 from blast_env.particles.structure import ModularObstacle, obstacle_of
-from blast_env.site import AnyCharge, PointSource, Problem, Scenario, ScenarioError
+from blast_env.problems import Problem, ScenarioError
+from blast_env.site import AnyCharge, PointSource, Scenario
 from blast_env.site.blast_site import BlastSite, Charge, StructureOutline
 from blast_env.site.parameters import SimulationParameters, for_charge
 from blast_env.site.zone import distance_m
