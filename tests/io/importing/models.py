@@ -10,7 +10,7 @@ import pytest
 import shapely
 from shapely.affinity import rotate, scale
 
-from blast_env.io.importing import Fate
+from blast_env.io.importing import Fate, ImportOptions, SiteImport, import_site
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
 
@@ -254,6 +254,11 @@ class Model:
 
     def slab(self, level: Any, left: float, size: tuple[float, float], top: float) -> None:
         self.box("IfcSlab", level, (left, 0.0, top - 0.2), (*size, 0.2), Fate.MERGED)
+
+    def imported(self, folder: Path) -> SiteImport:
+        """Import the model with a charge beside it."""
+        options = ImportOptions(charge_at=(self.charge_at,), protect=("Town Hall",))
+        return import_site(self.write(folder), options)
 
     def write(self, folder: Path) -> Path:
         self.file.write(str(folder / "model.ifc"))

@@ -16,6 +16,7 @@ from pyproj import Transformer
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
 from tests.io.importing.cities import ORIGIN, City, Face, block, box, gable
+from tests.io.importing.found import boxes
 from tests.io.importing.maps import BLOCK
 
 X, Y = ORIGIN
@@ -26,15 +27,6 @@ LOW_M = -1.9
 
 def imported(path: Path, **options: Any) -> SiteImport:
     return import_site(path, ImportOptions(**AT | options))
-
-
-def boxes(site: SiteImport) -> list[tuple[float, float, float]]:
-    """Return area, underside and top of each part of a building, the largest first."""
-    found = [
-        (round(building.outline.area, 1), building.base_m, float(building.height_m or 0.0))
-        for building in site.buildings
-    ]
-    return sorted(found, reverse=True)
 
 
 def town(faces: list[Face], kind: str = "Solid", **how: Any) -> City:
@@ -93,7 +85,7 @@ def test_the_buildings_of_a_map_are_the_same_as_blocks_of_a_model(tmp_path: Path
     }
     site = imported(city.write(tmp_path), protect_near=origin, **options)
     expected = sorted((round(plan.area, 1), height_m) for plan, height_m in houses)
-    found = sorted((area, top) for area, _, top in boxes(site))
+    found = sorted((area, float(top or 0.0)) for area, _, top in boxes(site))
     assert np.allclose(found, expected, rtol=2e-3, atol=0.26)  # modules are 0.5 m high
 
 

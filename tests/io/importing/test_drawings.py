@@ -10,6 +10,7 @@ from ezdxf.filemanagement import new, readfile
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
+from tests.io.importing.found import boxes
 from tests.io.importing.maps import rectangle
 
 CASES = Path(__file__).parent / "cases"
@@ -24,15 +25,6 @@ def drawn(path: Path, **options: Any) -> SiteImport:
 
 def case(name: str, **options: Any) -> SiteImport:
     return drawn(CASES / f"d_{name}.dxf", **options)
-
-
-def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
-    """Return area, underside and height of the buildings, the largest first."""
-    found = [
-        (round(building.outline.area, 1), building.base_m, building.height_m)
-        for building in site.buildings
-    ]
-    return sorted(found, reverse=True)
 
 
 def kinds(site: SiteImport, fate: Fate) -> list[str]:

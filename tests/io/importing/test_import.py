@@ -25,6 +25,7 @@ from blast_env.site import (
     load_scenario,
     save_scenario,
 )
+from tests.io.importing.found import imported
 from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))
@@ -36,10 +37,6 @@ TO_UTM = Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
 @pytest.fixture(scope="module")
 def block() -> SiteImport:
     return import_site(BLOCK, HALL)
-
-
-def imported(path: Path, **options: Any) -> SiteImport:
-    return import_site(path, ImportOptions(**options))
 
 
 def comparable(scenario: Scenario) -> dict[str, Any]:

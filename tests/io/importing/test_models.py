@@ -7,6 +7,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
+from tests.io.importing.found import boxes
 from tests.io.importing.models import Model
 
 ifcopenshell = pytest.importorskip("ifcopenshell")
@@ -17,15 +18,6 @@ CASES = Path(__file__).parent / "cases"
 def case(name: str, **options: Any) -> SiteImport:
     asked = {"protect": ("Court",), "charge_at": ((-6.0, 3.0),)}
     return import_site(CASES / f"i_{name}.ifc", ImportOptions(**asked | options))
-
-
-def boxes(site: SiteImport) -> list[tuple[float, float, float | None]]:
-    """Return area, underside and height of the buildings, the largest first."""
-    found = [
-        (round(building.outline.area, 1), building.base_m, building.height_m)
-        for building in site.buildings
-    ]
-    return sorted(found, reverse=True)
 
 
 def pane_m(site: SiteImport) -> tuple[float, float, float]:
@@ -118,11 +110,6 @@ def plain_model() -> Model:
     return Model("mm", 0.0, 0.0, "IFC4", ("plain",))
 
 
-def imported(model: Model, folder: Path) -> SiteImport:
-    options = ImportOptions(charge_at=(model.charge_at,), protect=("Town Hall",))
-    return import_site(model.write(folder), options)
-
-
 def test_storeys_and_windows_of_a_model_are_its_facade(tmp_path: Path) -> None:
     """What is before the house, and in it, is left out by name."""
     model = plain_model()
@@ -135,7 +122,7 @@ def test_storeys_and_windows_of_a_model_are_its_facade(tmp_path: Path) -> None:
                 model.box("IfcWindow", level, (left, y, 0.9), (1.2, 0.3, 1.4), Fate.MERGED)
     model.box("IfcColumn", levels[0], (2.0, -3.0, 0.0), (0.4, 0.4, 3.0), Fate.LEFT_OUT)
     model.box("IfcFurniture", levels[0], (3.0, 3.0, 0.0), (0.5, 0.5, 0.9), Fate.LEFT_OUT)
-    site = imported(model, tmp_path)
+    site = model.imported(tmp_path)
     assert {entry.place: entry.fate for entry in site.ledger.of(*FATES)} == model.fates
     (hall,) = site.scenario.structures
     assert (hall.title, hall.height_m) == ("Town Hall", 6.0)
@@ -151,13 +138,13 @@ def test_storeys_and_windows_of_a_model_are_its_facade(tmp_path: Path) -> None:
 def test_a_model_without_a_unit_or_a_building_is_refused(tmp_path: Path) -> None:
     model = plain_model()
     with pytest.raises(BlastEnvError, match=r"model.ifc: has no IfcBuilding"):
-        imported(model, tmp_path)
+        model.imported(tmp_path)
     model.building([0.0], "Town Hall")
     with pytest.raises(BlastEnvError, match=r"model.ifc: has no building"):
-        imported(model, tmp_path)
+        model.imported(tmp_path)
     model.file.by_type("IfcProject")[0].UnitsInContext = None
     with pytest.raises(BlastEnvError, match=r"model.ifc: states no unit of length, must state one"):
-        imported(model, tmp_path)
+        model.imported(tmp_path)
     (tmp_path / "bad.ifc").write_text("nonsense")
     with pytest.raises(BlastEnvError, match=r"bad.ifc: cannot be read as IFC"):
         import_site(tmp_path / "bad.ifc")

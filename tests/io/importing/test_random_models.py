@@ -5,7 +5,6 @@
 
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,7 +12,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.io.importing import FATES, Fate, ImportOptions, SiteImport, import_site
+from blast_env.io.importing import FATES, Fate
 from tests.io.importing.models import LOT_M, TURNS_DEG, UNITS, WALL_M, WAYS, Model
 
 TURNS = st.sampled_from(TURNS_DEG)
@@ -165,16 +164,11 @@ def models(draw: Any) -> Model:
     return found
 
 
-def imported(model: Model, folder: Path) -> SiteImport:
-    options = ImportOptions(charge_at=(model.charge_at,), protect=("Town Hall",))
-    return import_site(model.write(folder), options)
-
-
 @given(models())
 def test_every_element_has_its_fate_and_every_building_its_solid(
     tmp_path_factory: pytest.TempPathFactory, model: Model
 ) -> None:
-    site = imported(model, tmp_path_factory.mktemp("models"))
+    site = model.imported(tmp_path_factory.mktemp("models"))
     entries = site.ledger.of(*FATES)
     assert Counter(entry.place for entry in entries).most_common(1)[0][1] == 1
     assert {entry.place: entry.fate for entry in entries} == model.fates

@@ -5,7 +5,6 @@ import re
 import subprocess
 import tarfile
 import zipfile
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,20 +15,19 @@ import pytest
 import shapely
 from ezdxf import units
 
-from blast_env.errors import BlastEnvError, named
+from blast_env.errors import named
 from blast_env.io.importing import (
     Fate,
     ImportOptions,
     Ledger,
-    LedgerEntry,
     SiteImport,
-    import_site,
     read_map,
 )
 from blast_env.plots import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
 from studies.real_files.packages import Package, fetch
+from tests.io.importing.found import entries, error_of, imported, places
 from tests.io.importing.maps import (
     DEGREE_M,
     Extract,
@@ -43,24 +41,6 @@ from tests.io.importing.maps import (
 
 PLACE = charge(-5.0, 2.0)
 HOUSE = outline(rectangle(0, 0, 6, 4), name="House", height=6.0, protected=True)
-
-
-def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
-    return tuple(entry for entry in site.ledger.of(fate) if words in entry.kind)
-
-
-def places(found: Sequence[LedgerEntry]) -> list[str]:
-    return [entry.place for entry in found]
-
-
-def error_of(path: Path, **options: Any) -> str:
-    with pytest.raises(BlastEnvError) as caught:
-        import_site(path, ImportOptions(**options))
-    return str(caught.value)
-
-
-def imported(path: Path, **options: Any) -> SiteImport:
-    return import_site(path, ImportOptions(**options))
 
 
 # Extracts of OpenStreetMap.
@@ -103,7 +83,7 @@ def test_relation_whose_rings_share_a_side_is_put_together(tmp_path: Path) -> No
     right = shapely.affinity.translate(right, *house.outline.bounds[:2])
     assert shapely.hausdorff_distance(court.outline, right) < 0.1
     assert shapely.get_num_coordinates(court.outline) == 9
-    assert places(entries(site, Fate.GUESSED, "rings that touch")) == ["relation 5"]
+    assert places(site, Fate.GUESSED, "rings that touch") == ["relation 5"]
 
 
 def test_relation_of_many_rings_is_an_area_with_holes_and_islands(tmp_path: Path) -> None:
@@ -161,8 +141,8 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
         "way 4": 6.0,
     }
     assert [area for _, area in found.values()] == pytest.approx([100.0, 100.0], rel=0.01)
-    assert places(entries(site, Fate.MERGED, "small or without a height")) == ["way 5"]
-    assert places(entries(site, Fate.MERGED, "parts above their building, covered")) == ["way 1"]
+    assert places(site, Fate.MERGED, "small or without a height") == ["way 5"]
+    assert places(site, Fate.MERGED, "parts above their building, covered") == ["way 1"]
     assert all(building.protected for building in site.buildings)
     assert len({structure.building for structure in site.scenario.structures}) == 1
     weights = sum(structure.weight for structure in site.scenario.structures if structure.protected)
@@ -198,10 +178,10 @@ def test_roofs_are_open_below_and_cellars_are_left_out(tmp_path: Path) -> None:
     site = imported(extract.write(tmp_path), **HOUSE_1)
     (roof,) = (building for building in site.buildings if building.place == "way 3")
     assert (roof.base_m, roof.height_m) == (4.0, 4.5)
-    assert places(entries(site, Fate.GUESSED, "open below")) == ["way 3"]
-    assert places(entries(site, Fate.LEFT_OUT, "below the ground")) == ["way 4"]
-    assert places(entries(site, Fate.LEFT_OUT, "not on the ground")) == ["way 5"]
-    assert "way 6" in places(entries(site, Fate.READ, "place of a charge"))
+    assert places(site, Fate.GUESSED, "open below") == ["way 3"]
+    assert places(site, Fate.LEFT_OUT, "below the ground") == ["way 4"]
+    assert places(site, Fate.LEFT_OUT, "not on the ground") == ["way 5"]
+    assert "way 6" in places(site, Fate.READ, "place of a charge")
 
 
 def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) -> None:
@@ -217,8 +197,8 @@ def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) 
         "features[1]": (3.0, 84.0),
         "features[2]": (12.0, 16.0),
     }
-    assert places(entries(site, Fate.MERGED, "covered")) == ["features[3]"]
-    assert places(entries(site, Fate.CUT, "overlap left out")) == ["features[1]"]
+    assert places(site, Fate.MERGED, "covered") == ["features[3]"]
+    assert places(site, Fate.CUT, "overlap left out") == ["features[1]"]
 
 
 def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
@@ -226,8 +206,8 @@ def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
     thin = outline(rectangle(10, 0, 0.2, 30), name="Screen")
     site = imported(written(tmp_path, HOUSE, ruin, thin, PLACE))
     assert [building.place for building in site.buildings] == ["features[0]"]
-    assert places(entries(site, Fate.MERGED, "covered")) == ["features[1]"]
-    assert places(entries(site, Fate.LEFT_OUT, "centre of no module")) == ["features[2]"]
+    assert places(site, Fate.MERGED, "covered") == ["features[1]"]
+    assert places(site, Fate.LEFT_OUT, "centre of no module") == ["features[2]"]
 
 
 def test_exchanged_longitude_and_latitude_are_refused(tmp_path: Path) -> None:
@@ -315,14 +295,14 @@ def test_a_no_build_area_without_an_outline_is_named(tmp_path: Path) -> None:
     tree = charge(3.0, 9.0) | {"properties": {"kind": "keep_out", "name": "tree"}}
     site = imported(written(tmp_path, HOUSE, tree, PLACE), zone_around_m=8.0)
     assert not site.scenario.zone.keep_outs
-    assert places(entries(site, Fate.LEFT_OUT, "without an outline")) == ["features[1]"]
+    assert places(site, Fate.LEFT_OUT, "without an outline") == ["features[1]"]
 
 
 def test_a_lane_too_near_to_a_building_is_named(tmp_path: Path) -> None:
     lane = street(-0.1, width="2")
     lane["geometry"]["coordinates"] = [[1, -0.1], [5, -0.1]]
     site = imported(written(tmp_path, HOUSE, lane, PLACE))
-    assert places(entries(site, Fate.LEFT_OUT, "too near to a building")) == ["features[1]"]
+    assert places(site, Fate.LEFT_OUT, "too near to a building") == ["features[1]"]
 
 
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
@@ -585,7 +565,7 @@ def test_damaged_drawing_is_recovered_and_named(tmp_path: Path) -> None:
     path.write_text("\n".join([*lines[: at + 2], "NO HANDLE", *lines[at + 3 :]]))
     site = imported(path, **DRAWN)
     assert len(site.buildings) == 1
-    assert places(entries(site, Fate.GUESSED, "recovered")) == ["plan.dxf"]
+    assert places(site, Fate.GUESSED, "recovered") == ["plan.dxf"]
 
 
 @pytest.mark.parametrize("old", [True, False])

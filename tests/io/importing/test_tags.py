@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 import shapely
 
-from blast_env.errors import BlastEnvError
-from blast_env.io.importing import Fate, ImportOptions, LedgerEntry, SiteImport, import_site
+from blast_env.io.importing import Fate, ImportOptions, SiteImport, import_site
 from blast_env.site import PointSource, Scenario, SegmentSource
+from tests.io.importing.found import entries, error_of, places
 from tests.io.importing.maps import (
     DEGREE_M,
     Extract,
@@ -31,14 +31,6 @@ def case(name: str, **options: Any) -> SiteImport:
     return import_site(CASES / name, ImportOptions(**{"protect": ("Court",)} | options))
 
 
-def entries(site: SiteImport, fate: Fate, words: str) -> tuple[LedgerEntry, ...]:
-    return tuple(entry for entry in site.ledger.of(fate) if words in entry.kind)
-
-
-def places(site: SiteImport, fate: Fate, words: str) -> list[str]:
-    return [entry.place for entry in entries(site, fate, words)]
-
-
 def heights(site: SiteImport) -> dict[str, tuple[float, float | None]]:
     """Return underside and top of each building by its place in the file, m."""
     return {building.place: (building.base_m, building.height_m) for building in site.buildings}
@@ -57,12 +49,6 @@ def beside(**tags: Any) -> dict[str, Any]:
 def bare(**properties: Any) -> dict[str, Any]:
     """Return an outline beside the house with these properties and no others."""
     return beside() | {"properties": properties}
-
-
-def refusal(path: Path, **options: Any) -> str:
-    with pytest.raises(BlastEnvError) as caught:
-        import_site(path, ImportOptions(**options))
-    return str(caught.value)
 
 
 def segments(scenario: Scenario) -> list[SegmentSource]:
@@ -232,7 +218,7 @@ def test_a_unit_of_heights_is_that_of_numbers_without_one(tmp_path: Path) -> Non
     (round_one,) = (building for building in site.buildings if building.place == "features[3]")
     assert round_one.outline.area == pytest.approx(3.14 * (16.5 * FOOT_M) ** 2, rel=0.05)
     assert heights(of_map(tmp_path, features[1], height_unit="ft"))["features[2]"] == (3.0, 12.0)
-    assert "--height-unit is 'yards', must be one of m, mm, cm, dm, km, in, ft" in refusal(
+    assert "--height-unit is 'yards', must be one of m, mm, cm, dm, km, in, ft" in error_of(
         Path("a.geojson"), height_unit="yards"
     )
 
@@ -276,7 +262,7 @@ def test_a_height_below_the_underside_is_the_distance_from_it(tmp_path: Path) ->
 def test_a_house_of_a_kilometre_is_named() -> None:
     site = case("g_huge.geojson")
     assert places(site, Fate.GUESSED, "hardly any building has") == ["features[1]"]
-    assert "features[1]" in refusal(CASES / "g_huge.geojson", protect=("Court",), strict=True)
+    assert "features[1]" in error_of(CASES / "g_huge.geojson", protect=("Court",), strict=True)
 
 
 @pytest.mark.parametrize(
@@ -647,7 +633,7 @@ def test_a_street_below_a_raised_building_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_formats_that_are_not_read_name_the_way(name: str, words: str, tmp_path: Path) -> None:
-    message = refusal(tmp_path / name)
+    message = error_of(tmp_path / name)
     assert "must be one of .geojson, .json, .cityjson" in message
     assert words in message
 
@@ -664,12 +650,12 @@ def test_formats_that_are_not_read_name_the_way(name: str, words: str, tmp_path:
 def test_json_of_other_kinds_names_the_way(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "map.json"
     path.write_text(text)
-    assert words in refusal(path)
+    assert words in error_of(path)
 
 
 def test_drawings_have_their_own_unit_of_heights() -> None:
     path = CASES.parents[3] / "docs" / "data" / "market_street.dxf"
-    assert "--height-unit is not for a drawing" in refusal(path, height_unit="ft")
+    assert "--height-unit is not for a drawing" in error_of(path, height_unit="ft")
 
 
 def test_ids_of_overpass_are_those_of_the_extract(tmp_path: Path) -> None:
