@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from blast_env import load_scenario, save_scenario, write_layout
 from blast_env.cli import app
 from blast_env.gas import GasRun
-from blast_env.particles.event.engine import EventRun
+from blast_env.particles.event import EventRun
 from blast_env.particles.pymunk.engine import PymunkRun
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut

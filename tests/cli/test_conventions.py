@@ -21,7 +21,7 @@ from blast_env.cli.command import LazyCommand
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
 from blast_env.gas import GasRun
 from blast_env.layout import LayoutFile
-from blast_env.particles.event.engine import EventRun
+from blast_env.particles.event import EventRun
 from tests.agents.training_runs import scenario_file
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut

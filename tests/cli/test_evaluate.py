@@ -12,7 +12,7 @@ from blast_env import save_scenario
 from blast_env.evaluation import evaluate_layout
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutFile, write_layout
-from blast_env.particles.event.engine import EventRun
+from blast_env.particles.event import EventRun
 from blast_env.site import PointSource
 from tests.cli.running import run
 from tests.envs.small import small_scenario

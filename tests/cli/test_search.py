@@ -16,7 +16,7 @@ from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
-from blast_env.particles.event.engine import EventRun
+from blast_env.particles.event import EventRun
 from blast_env.site import Charge, SegmentSource
 from blast_env.surrogate import packaged_surrogate
 from tests.catalogue_sites import wide_yard

@@ -24,7 +24,7 @@ from blast_env.particles import (
     explosion_fan,
     obstacle_of,
 )
-from blast_env.particles.event.engine import EventRun
+from blast_env.particles.event import EventRun
 from blast_env.units import MODULE_SIDE_UNITS
 from tests.builders import point, site, square
 from tests.particles.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall

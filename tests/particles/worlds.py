@@ -4,8 +4,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.particles import Scene
-from blast_env.particles.event.engine import run_world
-from blast_env.particles.event.state import RECORD_COLUMNS, RecordArray, World, world_of
+from blast_env.particles.event import RECORD_COLUMNS, RecordArray, World, run_world, world_of
 
 
 class WorldRun:
