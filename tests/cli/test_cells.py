@@ -10,16 +10,9 @@ from blast_agents.training.run_folder import RunFolder
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import save_scenario
 from tests.cli.running import run
-from tests.gas_sites import glazed_hut, hut
+from tests.gas_sites import glazed_hut
 
 COARSE = 0.5
-
-
-@pytest.fixture
-def site(tmp_path: Path) -> Path:
-    path = tmp_path / "hut.toml"
-    save_scenario(hut(), path)
-    return path
 
 
 @pytest.fixture

@@ -15,13 +15,6 @@ from tests.cli.running import run
 from tests.gas_sites import WALL, hut, site_document
 
 
-@pytest.fixture
-def site(tmp_path: Path) -> Path:
-    path = tmp_path / "hut.toml"
-    save_scenario(hut(), path)
-    return path
-
-
 def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> None:
     expected = blast_env.simulate(hut(), engine="gas")
     options = ("--engine", "gas", "--excel", tmp_path / "a.xlsx")
