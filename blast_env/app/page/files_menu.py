@@ -8,10 +8,9 @@ import tomli_w
 from nicegui import events, ui
 
 from blast_env.app.design import SLOTS
-from blast_env.app.page.uploads import complain, file_upload, read_upload, site_upload
+from blast_env.app.page.uploads import complaints, file_upload, read_upload, site_upload
 from blast_env.app.session import Session
 from blast_env.app.sources import layout_of_file
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.study import final_cells
 from blast_env.files import scratch_folder
 from blast_env.gas.cost import cost_words
@@ -86,12 +85,10 @@ class FilesMenu:
                 if file is None:
                     return
                 dialog.close()
-                try:
+                with complaints():
                     layout = file.layout_for(self._session.scenario)
                     design = self._session.design.with_layout(layout)
                     self._session.put(f"layout of {event.file.name}", design)
-                except BlastEnvError as error:
-                    complain(error)
                 self._after()
 
             file_upload("drop a file here, or press +", (".json",), take)
@@ -106,23 +103,14 @@ class FilesMenu:
         session = self._session
         name = f"{session.scenario.name}_{SLOTS[session.design.active]}{suffix}"
         provenance = {"made by": "blast-env app", "versions": versions()}
-        try:
+        with complaints(), scratch_folder() as folder:
             plan = LayoutPlan(session.scenario, session.design.layout, provenance=provenance)
-            with scratch_folder() as folder:
-                content = export_layout(plan, folder / name).read_bytes()
-        except BlastEnvError as error:
-            complain(error)
-            return
-        ui.download.content(content, name)
+            ui.download.content(export_layout(plan, folder / name).read_bytes(), name)
 
     def _save_report(self, as_pdf: bool) -> None:
-        session = self._session
-        try:
-            session.cost_of_report()  # raises if no report is possible
-        except BlastEnvError as error:
-            complain(error)
-            return
-        ReportDialog(session, as_pdf)
+        with complaints():
+            self._session.cost_of_report()  # raises if no report is possible
+            ReportDialog(self._session, as_pdf)
 
 
 class ReportDialog:
@@ -178,10 +166,7 @@ class ReportDialog:
         name = f"{session.scenario.name}_{SLOTS[session.design.active]}"
         page = session.folder.path / f"{name}.html"
         self._dialog.close()
-        try:
+        with complaints():
             pdf = page.with_suffix(".pdf") if self._as_pdf else None
             session.report(page, pdf, **self._contents)
-        except BlastEnvError as error:
-            complain(error)
-            return
-        ui.notify("the report is being made: download it on the right when it is ready")
+            ui.notify("the report is being made: download it on the right when it is ready")

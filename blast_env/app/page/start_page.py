@@ -5,10 +5,9 @@ from datetime import datetime
 from nicegui import ui
 
 from blast_env.app.page.numbers import NumberField
-from blast_env.app.page.uploads import complain, site_upload
+from blast_env.app.page.uploads import complaints, site_upload
 from blast_env.app.session import Sessions
 from blast_env.app.sources import blank_site
-from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.units import MODULE_SIDE_M
 
@@ -77,15 +76,10 @@ class StartPage:
         self._create(load_scenario(name), name)
 
     def _blank(self) -> None:
-        try:
+        with complaints():
             self._create(blank_site(*(side.filled for side in self._sides)), "a blank site")
-        except BlastEnvError as error:
-            complain(error)
 
     def _create(self, scenario: Scenario, source: str) -> None:
-        try:
+        with complaints():
             session = self._sessions.new(scenario, f"site of {source}")
-        except BlastEnvError as error:
-            complain(error)
-            return
-        ui.navigate.to(f"/design/{session.folder.design_id}")
+            ui.navigate.to(f"/design/{session.folder.design_id}")

@@ -1,7 +1,8 @@
 """Uploaded files: read in a separate process, with a dialog for maps and one for errors."""
 
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -32,6 +33,15 @@ def complain(error: BlastEnvError) -> None:
         ui.label(str(error)).style("white-space: pre-wrap; overflow-wrap: anywhere")
         ui.label("Nothing was changed; the design is as it was.").classes("be-quiet")
         ui.button("close", on_click=dialog.close).props("autofocus no-caps")
+
+
+@contextmanager
+def complaints() -> Iterator[None]:
+    """End the block at an error of the user, which is shown."""
+    try:
+        yield
+    except BlastEnvError as error:
+        complain(error)
 
 
 async def read_upload(

@@ -7,10 +7,9 @@ from nicegui import ui
 
 from blast_env.answers.page import show
 from blast_env.app.page.numbers import NumberField
-from blast_env.app.page.uploads import complain
+from blast_env.app.page.uploads import complaints
 from blast_env.app.session import Session
 from blast_env.app.work import Answer, Question
-from blast_env.errors import BlastEnvError
 from blast_env.gas.cost import cost_words
 from blast_env.response.levels import LevelOfProtection
 
@@ -50,16 +49,12 @@ class VerdictView:
 
     def _ask(self, question: Question) -> None:
         session = self._session
-        try:
+        with complaints():
             level = LevelOfProtection(self._target.value)
             asked = question, level, self._mass.filled, int(self._budget.filled)
-            costs = session.cost_of_question(*asked)
+            cost = cost_words(session.cost_of_question(*asked))
             session.ask(*asked)
-        except BlastEnvError as error:
-            complain(error)
-            return
-        cost = cost_words(costs)
-        self._cost.text = f"{question}: up to {cost}; the panel Work shows its progress"
+            self._cost.text = f"{question}: up to {cost}; the panel Work shows its progress"
 
     def refresh(self) -> None:
         """Show the latest answers, if they or the design have changed."""
