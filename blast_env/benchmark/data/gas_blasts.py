@@ -21,6 +21,7 @@ TABLES: Final = (
     "street_site_blasts",
     "module_site_blasts",
     "liked_site_blasts",
+    "further_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
