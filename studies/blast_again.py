@@ -26,7 +26,7 @@ from blast_env.parquet import read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge
-from blast_env.surrogate.fitting import elements
+from blast_env.surrogate.samples import elements
 from blast_env.tables import table_of
 from studies.blast_table import COLUMNS, load_row, named
 from studies.site_names import scenario_of

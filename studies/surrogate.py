@@ -7,7 +7,7 @@ from pathlib import Path
 from shlex import join
 from statistics import fmean, median
 from time import perf_counter
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ import typer
 from blast_agents import packaged_agent
 
 from blast_env.answers.terminal import print_line
-from blast_env.arrays import BoolArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
@@ -39,17 +39,16 @@ from blast_env.surrogate.fitting import (
     Begun,
     Errors,
     LoadErrors,
-    Loads,
     Predictions,
-    Samples,
     errors,
     errors_of,
     fit,
     folds,
     predictions,
 )
-from blast_env.surrogate.intervals import covered, interval_factor, least_sites
+from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor, least_sites
 from blast_env.surrogate.network import Check, Fit, Networks, Surrogate, load_surrogate
+from blast_env.surrogate.samples import Loads, Samples
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS
@@ -65,6 +64,12 @@ MORE_DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet") for name in ("liked", "module")
 )
 """Data with which that fit went on."""
+
+LATEST_DATA: Final = (Path("docs/data/further_site_blasts.parquet"),)
+"""Data with which it went on once more."""
+
+STAGES: Final = (DATA, MORE_DATA, LATEST_DATA)
+"""All of them, in this order."""
 
 EVERY: Final = 8
 """One of so many sites is held out of the fits."""
@@ -182,7 +187,11 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: 
 def fit_it(
     data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts.")] = None,
     begin_with: Annotated[
-        Path | None, typer.Option(help="Surrogate that the fit goes on from; it is of --data.")
+        Path | None,
+        typer.Option(help="Surrogate that the fit goes on from; it is of --data and --also."),
+    ] = None,
+    also: Annotated[
+        list[Path] | None, typer.Option(help="Tables with which that one went on before.")
     ] = None,
     more: Annotated[
         list[Path] | None, typer.Option(help="Tables that it has not seen, for --begin-with.")
@@ -205,14 +214,16 @@ def fit_it(
         make_folder(out.parent)
         if (begin_with is None) != (not more):
             raise BlastEnvError("--begin-with and --more go together: give both, or none")
-        named = named_rows([*(data or DATA), *(more or ())], without or ())
-        of_more = named["scenario"].isin(named_rows(more)["scenario"] if more else [])
-        groups = (named["scenario_hash"][own].nunique() for own in (~of_more, of_more))
+        tables = [data or DATA, also or (), more or ()]
+        named = named_rows([path for stage in tables for path in stage], without or ())
+        groups = named["scenario_hash"].groupby(stage_of(named["scenario"], tables)).nunique()
         _check_held_out(sum(-(-group // every) for group in groups), every)  # at most so many
         samples = samples_of(named)
-        is_more = np.isin(samples.scenario, named["scenario"][of_more].unique())
-        held_out = held_out_of(samples, is_more, every, seed)
-        begun = None if begin_with is None else Begun(load_surrogate(begin_with), ~is_more)
+        stage = stage_of(samples.scenario, tables)
+        held_out = held_out_of(samples, stage, every, seed)
+        begun = None
+        if begin_with is not None:
+            begun = Begun(load_surrogate(begin_with), stage < len(tables) - 1)
         sites = len(np.unique(samples.site[held_out]))
         _check_held_out(sites, every)
         about = Fit(
@@ -231,7 +242,9 @@ def fit_it(
         )
         off = LoadErrors(impulse.errors, peak.errors)
         print_line(_errors_table({f"{sites} held-out sites": off}))
-        print_line("\n" + _coverage_table(samples, held_out, impulse.inside, peak.inside, _kind))
+        print_line(
+            "\n" + _coverage_table(samples, held_out, (impulse.covered, peak.covered), _kind)
+        )
         about = about.model_copy(
             update={"seconds": seconds, "impulse": impulse.check, "peak": peak.check}
         )
@@ -239,20 +252,32 @@ def fit_it(
         print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
 
 
-def held_out_of(samples: Samples, is_more: BoolArray, every: int, seed: int) -> BoolArray:
+def stage_of(
+    scenarios: "np.ndarray | pd.Series[str]", tables: Sequence[Sequence[Path]]
+) -> IntArray:
+    """Return in which stage of data each scenario is, the last one that has it (scenarios,)."""
+    stage: IntArray = np.zeros(len(scenarios), dtype=np.int64)
+    for number, paths in enumerate(tables):
+        if paths:
+            stage[np.isin(scenarios, named_rows(paths)["scenario"].unique())] = number
+    return stage
+
+
+def held_out_of(samples: Samples, stage: IntArray, every: int, seed: int) -> BoolArray:
     """Return the mask of the samples on held-out sites (samples,).
 
     Sites of the first data that are held out stay so, whatever is added.
 
     Args:
         samples: All samples.
-        is_more: Mask of those of added data (samples,).
-        every: One of so many sites is held out, of the first data and of the added ones.
+        stage: In which stage each came to the data (samples,).
+        every: One of so many sites is held out, of each stage.
         seed: Seed of their order.
     """
     held_out = np.zeros(len(samples), dtype=bool)
-    for own in (~is_more, is_more):
-        held_out[own] = folds(samples.site[own], every, seed)[0] if own.any() else False
+    for number in np.unique(stage):
+        own = stage == number
+        held_out[own] = folds(samples.site[own], every, seed)[0]
     return held_out
 
 
@@ -284,13 +309,12 @@ class Holdout:
 
     Attributes:
         errors: Errors of the predictions.
-        inside: Whether each load lies in its interval, set on the other half of these sites
-            (held-out samples,).
+        covered: Which loads lie in their intervals, set on the other half of these sites.
         check: Record for the surrogate's file, whose intervals are set on all of them.
     """
 
     errors: Errors
-    inside: BoolArray
+    covered: "Covered"
     check: Check
 
     @classmethod
@@ -315,32 +339,48 @@ class Holdout:
             spreads=round(interval_factor(off, found.spread, sites), 3),
         )
         halves = folds(sites, _HALVES, seed)
-        return cls(errors, covered(off, found.spread, sites, halves), check)
+        inside = covered(off, found.spread, sites, halves)
+        return cls(errors, Covered(inside, np.abs(off) / found.spread), check)
+
+
+class Covered(NamedTuple):
+    """Loads and their intervals.
+
+    Attributes:
+        inside: Whether each load lies in its interval (samples,).
+        spreads: Magnitude of the error of its prediction, in spreads of the networks (samples,).
+    """
+
+    inside: BoolArray
+    spreads: FloatArray
 
 
 def _coverage_table(
     samples: Samples,
     chosen: BoolArray,
-    impulse: BoolArray,
-    peak: BoolArray,
+    loads: tuple[Covered, Covered],
     group: Callable[[str], str],
 ) -> str:
     """Return the coverage of intervals by group of sites, each site with the same weight."""
-    groups = [*map(group, samples.scenario[chosen])]
-    shares = pd.DataFrame({"group": groups, "site": samples.site[chosen], "i": impulse, "p": peak})
-    by_site = shares.groupby(["group", "site"])[["i", "p"]].mean()
-    rows = [
-        (
-            str(name),
-            str(len(own)),
-            str((shares["group"] == name).sum()),
-            f"{100.0 * own['i'].mean():.1f} %",
-            f"{100.0 * own['p'].mean():.1f} %",
-        )
-        for name, own in by_site.groupby("group")
-    ]
+    groups = np.array([*map(group, samples.scenario[chosen])])
+    sites, rows = samples.site[chosen], []
+    for name in np.unique(groups):
+        own = groups == name
+        _, site, counts = np.unique(sites[own], return_inverse=True, return_counts=True)
+        weights = 1.0 / (len(counts) * counts[site])
+        inside = [f"{100.0 * (weights * item.inside[own]).sum():.1f} %" for item in loads]
+        taken = [f"{_quantile(item.spreads[own], weights):.1f}" for item in loads]
+        rows.append((str(name), str(len(counts)), str(own.sum()), *inside, *taken))
     headers = ("sites", "number", "loads", "impulses inside", "peaks inside")
-    return markdown_table(headers, rows)
+    more = ("spreads for 95 % of impulses", "of peaks")
+    return markdown_table((*headers, *more), rows)
+
+
+def _quantile(values: FloatArray, weights: FloatArray) -> float:
+    """Return the value up to which the weight is that of the intervals."""
+    order = np.argsort(values)
+    found = np.searchsorted(np.cumsum(weights[order]), COVERAGE)
+    return float(values[order[min(int(found), len(order) - 1)]])
 
 
 def _kind(scenario: str) -> str:
@@ -366,20 +406,20 @@ def check(
             found[sites] = errors(loaded, samples, every)
             if loaded.fit.impulse is not None and loaded.fit.peak is not None:
                 impulse, peak = (
-                    _inside(predictions(loaded, networks, samples, loads, every), loads, record)
+                    _covered(predictions(loaded, networks, samples, loads, every), loads, record)
                     for networks, loads, record in (
                         (loaded.impulse, samples.impulse, loaded.fit.impulse),
                         (loaded.peak, samples.peak, loaded.fit.peak),
                     )
                 )
-                coverage.append(_coverage_table(samples, every, impulse, peak, str))
+                coverage.append(_coverage_table(samples, every, (impulse, peak), str))
         print_line("\n\n".join((_errors_table(found), *coverage)))
 
 
-def _inside(found: Predictions, loads: Loads, record: Check) -> BoolArray:
-    """Return whether each load lies in its interval (samples,)."""
-    inside: BoolArray = np.abs(found.log_load - loads.target) <= record.spreads * found.spread
-    return inside
+def _covered(found: Predictions, loads: Loads, record: Check) -> Covered:
+    """Return which loads lie in the intervals that a fit has set."""
+    spreads = np.abs(found.log_load - loads.target) / found.spread
+    return Covered(spreads <= record.spreads, spreads)
 
 
 def _errors_table(found: Mapping[str, LoadErrors]) -> str:

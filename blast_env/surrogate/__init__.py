@@ -12,7 +12,6 @@ if TYPE_CHECKING:
         MEMBERS,
         Begun,
         Predictions,
-        Samples,
         errors,
         fit,
         folds,
@@ -32,7 +31,8 @@ if TYPE_CHECKING:
         packaged_surrogate,
     )
     from blast_env.surrogate.points import WallPoints
-    from blast_env.surrogate.relations import solid_relations
+    from blast_env.surrogate.relations import RELATIONS, solid_relations
+    from blast_env.surrogate.samples import Samples
     from blast_env.surrogate.walls import SurrogateSite, site_of
     from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 else:
@@ -45,6 +45,7 @@ __all__ = [
     "FEATURES",
     "INPUTS",
     "MEMBERS",
+    "RELATIONS",
     "SHAPES",
     "SHARES",
     "STATIONS",

@@ -1,30 +1,23 @@
 """Fit of the surrogate to blasts, and its errors on samples held out of the fit."""
 
-import json
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import groupby
 from math import ceil
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import pandas as pd
 import torch
 from scipy.stats import spearmanr
 from torch import Tensor, nn
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Piece
-from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
+from blast_env.surrogate.layers import SingleArray
 from blast_env.surrogate.network import (
     HIDDEN,
-    IMPULSE_POWER,
     MESSAGE,
-    PEAK_POWER,
     Fit,
     Member,
     Networks,
@@ -34,7 +27,8 @@ from blast_env.surrogate.network import (
     log_loads,
 )
 from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.walls import site_of
+from blast_env.surrogate.samples import Loads, Samples
+from blast_env.surrogate.ways import SHARES
 
 MEMBERS: Final = 5
 _BATCH: Final = 6
@@ -54,129 +48,18 @@ _MOST_GRADIENT: Final = 1.0
 _AGAIN: Final = 4
 """In a fit that goes on, a pass has one in so many of the earlier samples; so falls the rate."""
 
+_THINNING: Final = 2
+"""One in so many points of a wall is used in an update."""
+
+_FEW_POINTS: Final = 12
+"""Walls of so many points or fewer have all of them in an update."""
+
+_AT_ONCE: Final = 2**20
+"""Rows that are scaled at once."""
+
 _LEAST_SCALE: Final = 1e-3
 _LEAST_CASE: Final = 4
 """Least number of layouts of a case for its rank correlation."""
-
-_CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
-
-
-@dataclass(frozen=True, eq=False)
-class Loads:
-    """One kind of load on the structures of samples: impulses, Pa s, or peaks, Pa.
-
-    Attributes:
-        known: Logarithm of Kingery and Bulmash's load at all points (points,).
-        target: Logarithm of the load by gas dynamics (samples,).
-        power: Exponent of the mean over the points of a structure.
-    """
-
-    known: FloatArray
-    target: FloatArray
-    power: float
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Loads of structures, with the features of the points on their walls.
-
-    Attributes:
-        features: Features of all points (points, FEATURES).
-        relations: Relations of solids to points, ordered by sample, solid and point
-            (rows, RELATIONS).
-        area_m2: Wall area represented by each point (points,).
-        counts: Number of points of each sample (samples,).
-        solids: Number of structures and pieces of each sample (samples,).
-        impulse: The impulses.
-        peak: The peak overpressures.
-        site: Index of the site (samples,).
-        scenario: Name of the site, or "" (samples,).
-        case: Index of the combination of site, structure and charge (samples,).
-        layout: Index of the combination of site and layout (samples,).
-    """
-
-    features: FloatArray
-    relations: FloatArray
-    area_m2: FloatArray
-    counts: np.ndarray
-    solids: np.ndarray
-    impulse: Loads
-    peak: Loads
-    site: np.ndarray
-    scenario: np.ndarray
-    case: np.ndarray
-    layout: np.ndarray
-
-    def __len__(self) -> int:
-        """Number of samples."""
-        return len(self.counts)
-
-    @classmethod
-    def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
-        """Return the loads on protected structures of a table of `studies.blast_table`.
-
-        Args:
-            blasts: The table.
-            scenarios: Scenarios by content hash; rows of others are omitted.
-
-        Raises:
-            BlastEnvError: If no row remains.
-        """
-        known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
-        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
-        if rows.empty:
-            raise BlastEnvError("no load of a protected structure of a known scenario")
-        # 1. Each site once; each blast once, with the features of all points of its walls.
-        sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
-        features, related, area_m2, impulses, peaks = [], [], [], [], []
-        wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
-        columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
-        of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
-        for (scenario_hash, layout, *numbers), loads in of_blast:
-            site = sites[scenario_hash]
-            x_m, y_m, height_m, tnt_kg = map(float, numbers)
-            approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
-            barrier = site.barrier(elements(layout))
-            of_points = approach.features(barrier).astype(np.float32)
-            of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
-            names = [structure.name for structure in site.protected]
-            # 2. Of these, the points of each protected structure: a sample.
-            for *_, structure in loads:
-                own = approach.points_of(names.index(structure))
-                features.append(of_points[own])
-                related.append(of_solids[:, own].astype(np.float32))
-                area_m2.append(approach.area_m2[own])
-                impulses.append(approach.log_impulse[own])
-                peaks.append(approach.log_peak[own])
-        # 3. The samples in a row, and the cases in which layouts compete.
-        place = rows[["scenario_hash", "structure", *_CHARGE]]
-        return cls(
-            features=np.concatenate(features),
-            relations=np.concatenate([thing.reshape(-1, RELATIONS) for thing in related]),
-            area_m2=np.concatenate(area_m2),
-            counts=np.array([len(feature) for feature in features]),
-            solids=np.array([len(thing) for thing in related]),
-            impulse=Loads(
-                np.concatenate(impulses),
-                np.log(rows["impulse_pa_s"].to_numpy()),
-                IMPULSE_POWER,
-            ),
-            peak=Loads(
-                np.concatenate(peaks),
-                np.log(rows["peak_pa"].to_numpy()),
-                PEAK_POWER,
-            ),
-            site=rows.groupby("scenario_hash").ngroup().to_numpy(),
-            scenario=rows["scenario"].to_numpy(),
-            case=place.groupby(list(place.columns)).ngroup().to_numpy(),
-            layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
-        )
-
-
-def elements(text: str) -> tuple[Element, ...]:
-    """Return the layout of a row of the table."""
-    found = (tuple(load) for load in json.loads(text))
-    return tuple(prediction if len(prediction) == 2 else Piece(*prediction) for prediction in found)
 
 
 def fit(
@@ -223,7 +106,9 @@ def fit(
             tasks.append((network.to(device), _Target.of(loads, device), seed + number))
 
     def fitted(task: tuple["_Network", "_Target", int]) -> Member:
-        return _fitted(tensors, own, again, epochs, *task)
+        start = task[0].plain()
+        found = _fitted(tensors, own, again, epochs, *task)
+        return found if begun is None else _between(start, found)
 
     # 3. Two at a time, since torch leaves the interpreter to others while it multiplies.
     with ThreadPoolExecutor(2) as pool:
@@ -244,6 +129,15 @@ class Begun:
 
     surrogate: Surrogate
     samples: BoolArray
+
+
+def _between(one: Member, other: Member) -> Member:
+    """Return the network halfway between two, one of which the fit of the other began with.
+
+    Such a mean keeps what the first knew of other sites than those of the second fit (Wortsman and
+    others, Robust fine-tuning, CVPR 2022).
+    """
+    return Member(*(0.5 * (first + second) for first, second in zip(one, other, strict=True)))
 
 
 def _scales(samples: Samples, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
@@ -330,25 +224,53 @@ def predictions(
     chosen: BoolArray,
 ) -> Predictions:
     """Predict one kind of load, by `networks` of the surrogate, on the `chosen` samples."""
-    counts, solids = samples.counts[chosen], samples.solids[chosen]
-    points = np.repeat(chosen, samples.counts)
+    counts, points = samples.counts[chosen], np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
     # 1. What each solid says to each point; 2. the sum over the solids, sample by sample; 3. the
     # loads of points, and their mean over each structure.
-    messages = networks.messages(
-        surrogate.related(samples.relations[np.repeat(chosen, samples.counts * samples.solids)])
+    rows = np.repeat(chosen, samples.counts * samples.solids)
+    parts = np.stack((samples.structures, samples.solids - samples.structures), axis=1)
+    is_piece = np.repeat(
+        np.tile((False, True), len(samples)), (samples.counts[:, np.newaxis] * parts).ravel()
     )
-    heard = np.zeros((len(messages), points.sum(), messages.shape[2]))
-    first = 0
-    for start, count, number in zip(starts, counts, solids, strict=True):
-        own = messages[:, first : first + number * count]
-        own = own.reshape(len(messages), number, count, -1)
-        heard[:, start : start + count] = own.sum(axis=1)
-        first += number * count
-    differs = networks(surrogate.scaled(samples.features[points]), heard)
+    heard = [
+        _heard(
+            networks,
+            surrogate.related(samples.relations[own]),
+            counts,
+            parts[chosen, which],
+            of_pieces=bool(which),
+        )
+        for which, own in enumerate((rows & ~is_piece, rows & is_piece))
+    ]
+    differs = networks(surrogate.scaled(samples.features[points]), np.concatenate(heard, axis=2))
     known, area_m2 = loads.known[points], samples.area_m2[points]
     logs = log_loads(differs, known, area_m2, starts, loads.power)
     return Predictions(agreed(logs), logs.std(axis=0))
+
+
+def _heard(
+    networks: Networks, related: FloatArray, counts: IntArray, solids: IntArray, *, of_pieces: bool
+) -> SingleArray:
+    """Return the sum of the messages of solids to each point (members, points, MESSAGE).
+
+    Args:
+        networks: The networks.
+        related: Scaled relations, by sample, solid and point (rows, RELATIONS).
+        counts: Number of points of each sample (samples,).
+        solids: Number of its solids (samples,).
+        of_pieces: Whether they are pieces, not structures.
+    """
+    messages = networks.messages(related, of_pieces=of_pieces)
+    heard = np.zeros((len(messages), counts.sum(), messages.shape[2]), dtype=np.float32)
+    start = first = 0
+    for count, number in zip(counts.tolist(), solids.tolist(), strict=True):
+        own = messages[:, first : first + number * count]
+        heard[:, start : start + count] = own.reshape(len(messages), number, count, MESSAGE).sum(
+            axis=1
+        )
+        start, first = start + count, first + number * count
+    return heard
 
 
 def errors_of(found: Predictions, target: FloatArray, cases: np.ndarray) -> Errors:
@@ -419,85 +341,150 @@ class _Tensors:
     """`Samples` as inputs of the networks.
 
     Attributes:
+        samples: The samples.
         features: Scaled features (points, FEATURES).
         relations: Scaled relations (rows, RELATIONS).
         area_m2: Wall area represented by each point (points,).
         starts: Index of the first point of each sample (samples,).
-        counts: Number of points of each sample (samples,).
         first_rows: Index of the first row of relations of each sample (samples,).
-        rows: Number of these rows (samples,).
-        solids: Number of structures and pieces of each sample (samples,).
+        device: Device of torch.
     """
 
+    samples: Samples
     features: Tensor
     relations: Tensor
     area_m2: Tensor
     starts: IntArray
-    counts: IntArray
     first_rows: IntArray
-    rows: IntArray
-    solids: IntArray
+    device: str
 
     @classmethod
     def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray, device: str) -> "_Tensors":
         of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
         features, relations = (
-            torch.from_numpy(bounded(item, mean[own], scale[own]).astype(np.float32)).to(device)
+            torch.from_numpy(_bounded(item, mean[own], scale[own])).to(device)
             for item, own in ((samples.features, of_points), (samples.relations, of_solids))
         )
         area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32)).to(device)
         starts = np.cumsum([0, *samples.counts[:-1]])
-        rows = samples.counts * samples.solids
-        firsts = np.cumsum([0, *rows[:-1]])
-        return cls(
-            features, relations, area_m2, starts, samples.counts, firsts, rows, samples.solids
-        )
+        firsts = np.cumsum([0, *(samples.counts * samples.solids)[:-1]])
+        return cls(samples, features, relations, area_m2, starts, firsts, device)
 
-    def loss(self, network: "_Network", target: _Target, groups: Sequence[IntArray]) -> Tensor:
+    def loss(
+        self,
+        network: "_Network",
+        target: _Target,
+        groups: Sequence[IntArray],
+        rng: np.random.Generator,
+    ) -> Tensor:
         """Return the mean square error of the logarithm on groups of samples, each of one case.
 
         The mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
         """
         # A common error of all layouts of a case ranks none of them, so it counts less.
-        errors = self._errors(network, target, np.concatenate(groups))
+        errors = self._errors(network, target, groups, rng)
         parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
         common = torch.cat([part.mean().expand(len(part)) for part in parts])
         return (errors - common).square().mean() + _COMMON * common.square().mean()
 
-    def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
-        """Return the errors of the logarithm on some samples (samples,)."""
-        # 1. The rows of the points and of the relations of the samples, one sample after the other.
-        counts, solids, device = self.counts[numbers], self.solids[numbers], self.area_m2.device
-        points = torch.from_numpy(_runs_of(self.starts[numbers], counts)).to(device)
-        related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
-        begin = np.cumsum([0, *counts[:-1]])
-        # 2. Each solid speaks to all points of its sample.
-        hearing = [
-            np.tile(np.arange(first, first + count), number)
-            for first, count, number in zip(begin, counts, solids, strict=True)
-        ]
+    def _errors(
+        self,
+        network: "_Network",
+        target: _Target,
+        groups: Sequence[IntArray],
+        rng: np.random.Generator,
+    ) -> Tensor:
+        """Return the errors of the logarithm on samples, at some of their points (samples,)."""
+        # 1. The rows of all inputs: layouts of a case have its structures in common.
+        rows = _Rows.of(self, groups, rng)
+        walls, structures, behind, pieces = map(self._indices, rows.inputs)
         over = network(
-            self.features[points],
-            self.relations[related.to(device)],
-            torch.from_numpy(np.concatenate(hearing)).to(device),
+            self.features[walls][:, : FEATURES - SHARES],
+            (self.relations[structures], self._indices(rows.hearing_structures)),
+            self.features[behind][:, FEATURES - SHARES :],
+            (self.relations[pieces], self._indices(rows.hearing_pieces)),
+            self._indices(rows.wall),
         )
-        # 3. The load of a structure: the power mean of its points, by area.
-        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts)).to(device)
-        logs = target.power * (target.known[points] + over)
-        empty = torch.zeros(len(numbers), device=device)
+        # 2. The load of a structure: the power mean of its points, by area.
+        numbers, owner = np.concatenate(groups), self._indices(rows.owner)
+        logs = target.power * (target.known[behind] + over)
+        empty = torch.zeros(len(numbers), device=self.device)
         # Relative to the largest: high powers of pascals overflow.
         largest = (empty - torch.inf).scatter_reduce(0, owner, logs.detach(), "amax")
-        area_m2 = self.area_m2[points]
+        area_m2 = self.area_m2[behind]
         shares = area_m2 * torch.exp(logs - largest[owner])
         mean = empty.index_add(0, owner, shares) / empty.index_add(0, owner, area_m2)
         log_loads = (torch.log(mean) + largest) / target.power
-        return log_loads - target.target[torch.from_numpy(numbers).to(device)]
+        return log_loads - target.target[self._indices(numbers)]
+
+    def _indices(self, numbers: IntArray) -> Tensor:
+        return torch.from_numpy(numbers).to(self.device)
 
 
-def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
-    """Return the concatenated ranges of `counts` integers from each start."""
-    runs = [np.arange(e, e + count) for e, count in zip(starts, counts, strict=True)]
-    return np.concatenate(runs)
+class _Rows(NamedTuple):
+    """Where the inputs of groups of samples are, and what they belong to.
+
+    Attributes:
+        inputs: Indices of the points of each group (walls,), of the relations of structures to
+            them, of the points behind each layout (behind,), and of the relations of its pieces.
+        hearing_structures: Number of the point, among the walls, of each relation of a structure.
+        hearing_pieces: The same of each relation of a piece, among those behind layouts.
+        wall: Number of each point behind a layout among the walls (behind,).
+        owner: Number of its sample (behind,).
+    """
+
+    inputs: tuple[IntArray, IntArray, IntArray, IntArray]
+    hearing_structures: IntArray
+    hearing_pieces: IntArray
+    wall: IntArray
+    owner: IntArray
+
+    @classmethod
+    def of(cls, tensors: _Tensors, groups: Sequence[IntArray], rng: np.random.Generator) -> "_Rows":
+        """Return the rows of groups of samples, each of one case, at every other point of walls."""
+        samples, starts, firsts = tensors.samples, tensors.starts, tensors.first_rows
+        none: IntArray = np.empty(0, dtype=np.int64)
+        walls, structures, heard, behind = [none], [none], [none], [none]
+        pieces, heard_pieces, wall, owner = [none], [none], [none], [none]
+        number = walls_before = behind_before = 0
+        for group in groups:
+            first = group[0]
+            count, standing = int(samples.counts[first]), int(samples.structures[first])
+            points = _some_points(count, rng)
+            own = np.arange(len(points))
+            walls.append(starts[first] + points)
+            rows = firsts[first] + count * np.arange(standing)[:, np.newaxis] + points
+            structures.append(rows.ravel())
+            heard.append(np.tile(walls_before + own, standing))
+            for sample in group:
+                behind.append(starts[sample] + points)
+                wall.append(walls_before + own)
+                owner.append(np.full(len(points), number))
+                solids = np.arange(standing, samples.solids[sample])
+                rows = firsts[sample] + count * solids[:, np.newaxis] + points
+                pieces.append(rows.ravel())
+                heard_pieces.append(np.tile(behind_before + own, len(solids)))
+                number, behind_before = number + 1, behind_before + len(points)
+            walls_before += len(points)
+        of_all = (walls, structures, behind, pieces, heard, heard_pieces, wall, owner)
+        found = [np.concatenate(item) for item in of_all]
+        return cls((found[0], found[1], found[2], found[3]), *found[4:])
+
+
+def _some_points(count: int, rng: np.random.Generator) -> IntArray:
+    """Return every other point of a wall, of a few all: an update costs half."""
+    if count <= _FEW_POINTS:
+        return np.arange(count)
+    return np.arange(int(rng.integers(_THINNING)), count, _THINNING)
+
+
+def _bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> SingleArray:
+    """Return `bounded` in single precision, part by part: there are gigabytes of relations."""
+    found = np.empty(numbers.shape, dtype=np.float32)
+    for first in range(0, len(numbers), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        found[part] = bounded(numbers[part], mean, scale)
+    return found
 
 
 class _Network(nn.Module):
@@ -507,24 +494,42 @@ class _Network(nn.Module):
         super().__init__()
         self.send = nn.Linear(RELATIONS, MESSAGE)
         self.message = nn.Linear(MESSAGE, MESSAGE)
-        self.first = nn.Linear(FEATURES + MESSAGE, HIDDEN)
+        self.piece_send = nn.Linear(RELATIONS, MESSAGE)
+        self.piece_message = nn.Linear(MESSAGE, MESSAGE)
+        self.first = nn.Linear(FEATURES + 2 * MESSAGE, HIDDEN)
         self.second = nn.Linear(HIDDEN, HIDDEN)
         self.last = nn.Linear(HIDDEN, 1)
 
-    def forward(self, features: Tensor, relations: Tensor, hearing: Tensor) -> Tensor:
-        """Return the predictions at points (points,).
+    def forward(
+        self,
+        walls: Tensor,
+        structures: tuple[Tensor, Tensor],
+        shares: Tensor,
+        pieces: tuple[Tensor, Tensor],
+        wall: Tensor,
+    ) -> Tensor:
+        """Return the predictions at points behind layouts (points,).
 
         Args:
-            features: Features of the points (points, FEATURES).
-            relations: Relations of solids to points (rows, RELATIONS).
-            hearing: Index of the point of each of these rows (rows,).
+            walls: Features of the points of walls that no layout changes (walls, n).
+            structures: Relations of structures, and the number of the wall's point of each.
+            shares: Open shares behind layouts (points, SHARES).
+            pieces: Relations of pieces, and the number of the point behind a layout of each.
+            wall: Number of each of these among the points of walls (points,).
         """
         # (1) Each solid sends a message to each point; (2) their sum does not depend on their order
-        # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sum give the load.
+        # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sums give the load.
         silu = nn.functional.silu
-        messages = silu(self.message(silu(self.send(relations))))
-        heard = features.new_zeros(len(features), MESSAGE).index_add(0, hearing, messages)
-        hidden = silu(self.first(torch.cat((features, heard), dim=1)))
+        of_structures = silu(self.message(silu(self.send(structures[0]))))
+        of_pieces = silu(self.piece_message(silu(self.piece_send(pieces[0]))))
+        heard = walls.new_zeros(len(walls), MESSAGE).index_add(0, structures[1], of_structures)
+        also = walls.new_zeros(len(shares), MESSAGE).index_add(0, pieces[1], of_pieces)
+        # The first layer's sums over what layouts have in common are made once.
+        constant, share, structure, piece = torch.split(
+            self.first.weight, [FEATURES - SHARES, SHARES, MESSAGE, MESSAGE], dim=1
+        )
+        same = walls @ constant.T + heard @ structure.T + self.first.bias
+        hidden = silu(same[wall] + shares @ share.T + also @ piece.T)
         said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
         return said
 
@@ -570,7 +575,7 @@ def _fitted(
         if met:
             shown = np.append(new, len(new) + rng.choice(len(met), drawn, replace=False))
         for batch in np.array_split(rng.permutation(shown), batches):
-            loss = data.loss(network, target, [groups[number] for number in batch])
+            loss = data.loss(network, target, [groups[number] for number in batch], rng)
             if not torch.isfinite(loss):
                 raise BlastEnvError(f"network of seed {seed} in epoch {epoch}: no finite error")
             optimizer.zero_grad()

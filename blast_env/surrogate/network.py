@@ -51,11 +51,16 @@ IMPULSE_POWER: Final = 1.0
 PEAK_POWER: Final = 16.0
 """Exponent of the power mean over the walls for peaks: close to the maximum."""
 
+_MOST_BYTES: Final = 10_000_000
+"""Largest file of a surrogate: some eighty networks."""
+
 _MOST_SPREADS: Final = 4.0
 """Bound on the distance of inputs from their mean, in units of their scale."""
 
-SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,)) + (
-    (FEATURES + MESSAGE, HIDDEN),
+_SENDING: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,))
+
+SHAPES: Final = (*_SENDING, *_SENDING) + (
+    (FEATURES + 2 * MESSAGE, HIDDEN),
     (HIDDEN,),
     (HIDDEN, HIDDEN),
     (HIDDEN,),
@@ -63,6 +68,18 @@ SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,
     (1,),
 )
 """Shapes of the arrays of a network, in the order of `Member`."""
+
+_BEFORE: Final = 4
+"""The format before, whose files are read, too."""
+
+_RELATIONS_BEFORE: Final = 15
+_SHAPES_BEFORE: Final = (
+    (_RELATIONS_BEFORE, MESSAGE),
+    *_SENDING[1:],
+    (FEATURES + MESSAGE, HIDDEN),
+    *SHAPES[2 * len(_SENDING) + 1 :],
+)
+"""Shapes of its arrays: structures and pieces had the same networks, and fewer relations."""
 
 
 class Check(BaseModel):
@@ -102,7 +119,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[4] = 4
+    format: Literal[4, 5] = 5
     command: str
     versions: dict[str, str]
     engine: str
@@ -178,14 +195,18 @@ class Guess(NamedTuple):
 class Member(NamedTuple):
     """A network: weights and biases of its layers, in the order of their use.
 
-    The first two layers compute messages, the others the prediction at a point from messages and
-    features.
+    The first two layers compute the messages of structures, the next two those of pieces, the
+    others the prediction at a point from features and the sums of both.
     """
 
     send: AnyFloats
     send_bias: AnyFloats
     message: AnyFloats
     message_bias: AnyFloats
+    piece_send: AnyFloats
+    piece_send_bias: AnyFloats
+    piece_message: AnyFloats
+    piece_message_bias: AnyFloats
     first: AnyFloats
     first_bias: AnyFloats
     second: AnyFloats
@@ -215,15 +236,16 @@ class Networks:
         single = [np.ascontiguousarray(item, dtype=np.float32) for item in stacked]
         self._layers = Member(*single)
 
-    def messages(self, scaled: FloatArray) -> SingleArray:
+    def messages(self, scaled: FloatArray, *, of_pieces: bool) -> SingleArray:
         """Return the message of each solid to each point (members, solids x points, MESSAGE).
 
         Args:
             scaled: Their relations, less the mean, over the scale (solids x points, RELATIONS).
+            of_pieces: Whether they are pieces, not structures.
         """
-        layers = self._layers
+        layers = self._layers[len(_SENDING) :] if of_pieces else self._layers
         given = np.ascontiguousarray(scaled, dtype=np.float32)[np.newaxis]
-        found: SingleArray = two_layers(given, *layers[:4])
+        found: SingleArray = two_layers(given, *layers[: len(_SENDING)])
         return found
 
     def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
@@ -231,14 +253,15 @@ class Networks:
 
         Args:
             scaled: Features of points, less the mean, over the scale (points, FEATURES).
-            heard: Sum of the messages to each point (members, points, MESSAGE).
+            heard: Sums of the messages of structures and of pieces to each point (members, points,
+                2 MESSAGE).
 
         Returns:
             (members, points).
         """
         layers = self._layers
-        members, points, _ = heard.shape
-        both = np.empty((members, points, FEATURES + MESSAGE), dtype=np.float32)
+        members, points, length = heard.shape
+        both = np.empty((members, points, FEATURES + length), dtype=np.float32)
         both[..., :FEATURES], both[..., FEATURES:] = scaled, heard
         # Two hidden layers, then a linear one to a single number per point.
         second = two_layers(
@@ -249,13 +272,15 @@ class Networks:
 
     def layers(self, power: float) -> NetworkLayers:
         """Return the layers as compiled code takes them, and the power of the mean over walls."""
-        layers, constant = self._layers, FEATURES - SHARES
-        of_constants = layers.first[:, :constant], layers.first[:, FEATURES:]
+        layers, sending = self._layers, len(_SENDING)
+        constants, shares, structures, pieces = np.split(
+            layers.first, (FEATURES - SHARES, FEATURES, FEATURES + MESSAGE), axis=1
+        )
         return NetworkLayers(
-            layers[:4],
-            np.concatenate(of_constants, axis=1),
+            (layers[:sending], layers[sending : 2 * sending]),
+            np.concatenate((constants, structures), axis=1),
             layers.first_bias,
-            np.ascontiguousarray(layers.first[:, constant:]),
+            np.concatenate((shares, pieces), axis=1),
             layers.second,
             layers.second_bias,
             np.ascontiguousarray(layers.last[..., 0]),
@@ -482,19 +507,25 @@ def load_surrogate(path: str | Path) -> Surrogate:
     """
     path = Path(path)
     try:
-        text = read_text(path)
+        text = read_text(path, _MOST_BYTES)
     except DocumentError as error:
         raise BlastEnvError(f"{path}: {error}") from error
     try:
         content = checked_as(_File, parse_json(text))
     except DocumentError as error:
         raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
+    mean, scale = np.array(content.mean), np.array(content.scale)
+    impulse, peak = (
+        Networks([_member(member, content.fit.format) for member in members])
+        for members in (content.members, content.peak_members)
+    )
+    more = INPUTS - len(mean)
     return Surrogate(
-        np.array(content.mean),
-        np.array(content.scale),
-        _networks(content.members),
-        _networks(content.peak_members),
-        content.fit,
+        np.append(mean, np.zeros(more)),
+        np.append(scale, np.ones(more)),
+        impulse,
+        peak,
+        content.fit.model_copy(update={"format": _BEFORE + 1}),
     )
 
 
@@ -524,10 +555,14 @@ class _File(BaseModel):
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:
+        shapes: Sequence[tuple[int, ...]] = SHAPES
+        inputs = INPUTS
+        if self.fit.format == _BEFORE:
+            shapes, inputs = _SHAPES_BEFORE, FEATURES + _RELATIONS_BEFORE
         for name, numbers in (("mean", self.mean), ("scale", self.scale)):
-            if len(numbers) != INPUTS:
-                raise ValueError(f"{name} has {len(numbers)} numbers, must be {INPUTS}")
-        wanted = [prod(shape) for shape in SHAPES]
+            if len(numbers) != inputs:
+                raise ValueError(f"{name} has {len(numbers)} numbers, must be {inputs}")
+        wanted = [prod(shape) for shape in shapes]
         for name, members in (("members", self.members), ("peak_members", self.peak_members)):
             for number, member in enumerate(members):
                 sizes = [len(flat) for flat in member]
@@ -540,15 +575,18 @@ def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
     return [[_numbers(array) for array in member] for member in members]
 
 
-def _networks(members: Sequence[Sequence[Sequence[float]]]) -> Networks:
-    return Networks(
-        [
-            Member(
-                *(np.array(flat).reshape(shape) for flat, shape in zip(member, SHAPES, strict=True))
-            )
-            for member in members
-        ]
-    )
+def _member(flat: Sequence[Sequence[float]], form: int) -> Member:
+    """Return a network from its flat lists; one of the format before gets the further inputs."""
+    shapes = _SHAPES_BEFORE if form == _BEFORE else SHAPES
+    arrays = [np.array(item).reshape(shape) for item, shape in zip(flat, shapes, strict=True)]
+    if form != _BEFORE:
+        return Member(*arrays)
+    # Further relations have no weight at first, and pieces the same networks as structures.
+    send, first = arrays[0], arrays[len(_SENDING)]
+    more = np.zeros((RELATIONS - len(send), send.shape[1]))
+    sending = [np.concatenate((send, more)), *arrays[1 : len(_SENDING)]]
+    both = np.concatenate((first, first[FEATURES:]))
+    return Member(*(*sending, *sending, both, *arrays[len(_SENDING) + 1 :]))
 
 
 def _numbers(array: AnyFloats) -> list[float]:

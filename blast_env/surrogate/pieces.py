@@ -56,11 +56,12 @@ class NetworkLayers(NamedTuple):
     """The layers of a set of networks, in single precision.
 
     Attributes:
-        sending: Weights and biases of the two layers of messages.
+        sending: Weights and biases of the two layers of messages of structures, and of pieces.
         constant: Weights of the first layer at points, of inputs that no layout changes and of the
             messages of structures (members, n + length, width).
         first_bias: Its biases (members, width).
-        first: Its weights of open shares and messages (members, SHARES + length, width).
+        first: Its weights of open shares and of the messages of pieces (members, SHARES + length,
+            width).
         second: Weights of the second layer (members, width, width).
         second_bias: Its biases (members, width).
         last: Weights of the last layer (members, width).
@@ -68,7 +69,7 @@ class NetworkLayers(NamedTuple):
         power: Exponent of the mean over the walls.
     """
 
-    sending: tuple[SingleArray, SingleArray, SingleArray, SingleArray]
+    sending: tuple[tuple[SingleArray, ...], tuple[SingleArray, ...]]
     constant: SingleArray
     first_bias: SingleArray
     first: SingleArray
@@ -134,7 +135,7 @@ class PieceKnowledge:
         self._met: dict[Box, int] = {}
         self._points = len(approach.area_m2)
         self._rows = whole(self._points)
-        sent = self._sent(approach.solids, room, "of structures")
+        sent = self._sent(approach.solids, 0, room, "of structures")
         pairs = zip(networks, sent, strict=True)
         self._bases = [self._base(number, *pair, room) for number, pair in enumerate(pairs)]
         self._pieces = Pieces(
@@ -181,7 +182,7 @@ class PieceKnowledge:
         stopped = room("stopped by pieces", (len(boxes), *ways.stopped.shape), BYTE)
         is_open = room("open behind pieces", (len(boxes), self._points), BOOL)
         ways.put_stopped_by(pieces, stopped, is_open)
-        sent = self._sent(self.approach.relations(pieces, room), room, "of pieces")
+        sent = self._sent(self.approach.relations(pieces, room), 1, room, "of pieces")
         return Pieces(stopped.reshape(len(boxes), self._points, _PLACES), is_open, sent)
 
     def _keep(self, boxes: Sequence[Box], fresh: Pieces) -> None:
@@ -230,18 +231,19 @@ class PieceKnowledge:
         )
         return found
 
-    def _sent(self, relations: FloatArray, room: Room, name: str) -> list[SingleArray]:
+    def _sent(self, relations: FloatArray, which: int, room: Room, name: str) -> list[SingleArray]:
         """Return the messages of solids by each set of networks (members, solids, rows, length)."""
         solids = len(relations)
         rows = room("related", (1, solids * self._rows, RELATIONS), SINGLE)
         _put_related(relations, *self._scales, rows.reshape(solids, self._rows, RELATIONS))
         found = []
         for number, networks in enumerate(self._networks):
-            _, _, second, _ = networks.sending
+            sending = networks.sending[which]
+            second = sending[2]
             shape = len(second), solids * self._rows, second.shape[2]
             sent = room(f"messages {number} {name}", shape, SINGLE)
             middle = room("middle", (ROWS_AT_ONCE, second.shape[1]), SINGLE)
-            put_two_layers(rows, *networks.sending, middle, sent)
+            put_two_layers(rows, *sending, middle, sent)
             found.append(sent.reshape(len(second), solids, self._rows, -1))
         return found
 

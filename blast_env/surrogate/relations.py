@@ -16,7 +16,7 @@ from numba import njit
 from blast_env.arrays import FloatArray
 from blast_env.compilation import compiled
 
-RELATIONS: Final = 15
+RELATIONS: Final = 28
 """Number of relations per solid and point."""
 
 _LEAST_SCALED: Final = 0.05
@@ -24,6 +24,16 @@ _LEAST_SCALED: Final = 0.05
 
 _MOST: Final = 6.0
 """Bound on the magnitude of all relations."""
+
+_BEFORE_WALL: Final = 15
+"""Index of the first relation to the wall of the point."""
+
+_ECHO: Final = 4
+_ECHOES: Final = (20, 20 + _ECHO)
+"""Index of the first relation of the echo of a face along the wall, and of one across."""
+
+_NEAR: Final = 1.0
+"""Bound on the magnitude of how far an echo is within its face, in scaled lengths."""
 
 
 def solid_relations(
@@ -40,6 +50,11 @@ def solid_relations(
     its height; its height above the straight path; logarithms of its distances from charge and
     point; the detours round its far and near end, and over its top; the gap between it and the
     path; whether it crosses the path in plan.
+
+    Then in the frame of the point's wall, which tells how a solid is turned: its distance before
+    the wall, the distance of its centre along the wall to the side of the charge, half its extent
+    off and along the wall, and the cosine between path and normal in plan. Then two echoes, of its
+    face along the wall and of that across; see `_put_echo`.
 
     Args:
         start_m: Position of the charge (3,).
@@ -106,7 +121,20 @@ def put_relations(
                     (left, bottom, right, top, height_m),
                     own,
                 )
+                _put_before_wall(
+                    (outward[point, 0], outward[point, 1]),
+                    (points_m[point, 0], points_m[point, 1]),
+                    (start_m[0], start_m[1]),
+                    way_m,
+                    scale_m,
+                    (left, bottom, right, top),
+                    own,
+                )
             # 4. The relations that depend on the height of the point.
+            for echo in _ECHOES:
+                if own[echo] > 0.0:
+                    echo_m = start_m[2] + own[echo + 2] * (points_m[point, 2] - start_m[2])
+                    own[echo + 3] = _near((height_m - echo_m) / scale_m)
             over_m = height_m - straight_m
             own[7] = min(max(over_m / scale_m, -_MOST), _MOST)
             own[12] = min(_detour_m(there_m, way_m, max(over_m, 0.0)) / scale_m, _MOST)
@@ -152,8 +180,110 @@ def _put_in_plan(
     own[12] = 0.0
     own[13] = max(abs(aside_m) - half_aside_m, 0.0) / scale_m
     own[14] = 1.0 if crosses and abs(aside_m) < half_aside_m else 0.0
-    for number in range(RELATIONS):
+    for number in range(_BEFORE_WALL):
         own[number] = min(max(own[number], -_MOST), _MOST)
+
+
+@njit(error_model="numpy")
+def _put_before_wall(
+    outward: tuple[float, float],
+    point_m: tuple[float, float],
+    start_m: tuple[float, float],
+    way_m: float,
+    scale_m: float,
+    solid: tuple[float, float, float, float],
+    own: FloatArray,
+) -> None:
+    """Put the relations in the frame of the point's wall, and the echoes."""
+    left, bottom, right, top = solid
+    out_x, out_y = outward
+    to_x, to_y = start_m[0] - point_m[0], start_m[1] - point_m[1]
+    # The wall's own direction, to the side of the charge.
+    along_x, along_y = -out_y, out_x
+    if along_x * to_x + along_y * to_y < 0.0:
+        along_x, along_y = -along_x, -along_y
+    half_x, half_y = 0.5 * (right - left), 0.5 * (top - bottom)
+    off_x, off_y = 0.5 * (left + right) - point_m[0], 0.5 * (bottom + top) - point_m[1]
+    half_out_m = abs(out_x) * half_x + abs(out_y) * half_y
+    own[15] = (out_x * off_x + out_y * off_y - half_out_m) / scale_m
+    own[16] = (along_x * off_x + along_y * off_y) / scale_m
+    own[17] = half_out_m / scale_m
+    own[18] = (abs(along_x) * half_x + abs(along_y) * half_y) / scale_m
+    own[19] = (out_x * to_x + out_y * to_y) / way_m
+    for number in range(_BEFORE_WALL, _ECHOES[0]):
+        own[number] = min(max(own[number], -_MOST), _MOST)
+    # Faces along the wall are those whose normal is nearer to its own.
+    of_x, of_y = (_ECHOES[0], _ECHOES[1]) if abs(out_x) >= abs(out_y) else (_ECHOES[1], _ECHOES[0])
+    _put_echo(
+        start_m[0],
+        start_m[1],
+        point_m[0],
+        point_m[1],
+        (left, right, bottom, top),
+        way_m,
+        scale_m,
+        of_x,
+        own,
+    )
+    _put_echo(
+        start_m[1],
+        start_m[0],
+        point_m[1],
+        point_m[0],
+        (bottom, top, left, right),
+        way_m,
+        scale_m,
+        of_y,
+        own,
+    )
+
+
+@njit(error_model="numpy")
+def _put_echo(
+    start_m: float,
+    start_along_m: float,
+    point_m: float,
+    point_along_m: float,
+    solid: tuple[float, float, float, float],
+    way_m: float,
+    scale_m: float,
+    first: int,
+    own: FloatArray,
+) -> None:
+    """Put the echo of a face of a solid, if charge and point are before it: by an image charge.
+
+    In order: length of the path over that of the echo (0 if there is none), how far the echo is
+    within the face, where on its way it is reflected, and how far below the top.
+
+    Args:
+        start_m: Position of the charge across the face.
+        start_along_m: The same along the face.
+        point_m: Position of the point across the face.
+        point_along_m: The same along the face.
+        solid: Low and high end of the solid across the face, and along it.
+        way_m: Length of the path in plan.
+        scale_m: Scaling length.
+        first: Index of the first number.
+        own: The relations.
+    """
+    low, high, begin, end = solid
+    to_m, from_m = start_m - high, point_m - high
+    if to_m < 0.0 or from_m < 0.0:
+        to_m, from_m = low - start_m, low - point_m
+    if to_m < 0.0 or from_m < 0.0:
+        own[first], own[first + 1], own[first + 2], own[first + 3] = 0.0, -_NEAR, 0.0, -_NEAR
+        return
+    share = to_m / (to_m + from_m + 1e-6)
+    aside_m = point_along_m - start_along_m
+    at_m = start_along_m + share * aside_m
+    own[first] = way_m / sqrt((to_m + from_m) ** 2 + aside_m**2 + 1e-6)
+    within_m = 0.5 * (end - begin) - abs(at_m - 0.5 * (begin + end))
+    own[first + 1], own[first + 2] = _near(within_m / scale_m), share
+
+
+@njit(error_model="numpy")
+def _near(scaled: float) -> float:
+    return float(min(max(scaled, -_NEAR), _NEAR))
 
 
 @njit(error_model="numpy")

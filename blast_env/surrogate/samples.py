@@ -1,0 +1,143 @@
+"""Samples for a fit of the surrogate: loads of structures, with what its networks see of them."""
+
+import json
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Piece
+from blast_env.site import Scenario
+from blast_env.site.blast_site import Charge
+from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
+from blast_env.surrogate.relations import RELATIONS
+from blast_env.surrogate.walls import site_of
+
+_CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """One kind of load on the structures of samples: impulses, Pa s, or peaks, Pa.
+
+    Attributes:
+        known: Logarithm of Kingery and Bulmash's load at all points (points,).
+        target: Logarithm of the load by gas dynamics (samples,).
+        power: Exponent of the mean over the points of a structure.
+    """
+
+    known: FloatArray
+    target: FloatArray
+    power: float
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Loads of structures, with the features of the points on their walls.
+
+    Attributes:
+        features: Features of all points (points, FEATURES).
+        relations: Relations of solids to points, ordered by sample, solid and point
+            (rows, RELATIONS).
+        area_m2: Wall area represented by each point (points,).
+        counts: Number of points of each sample (samples,).
+        solids: Number of structures and pieces of each sample (samples,).
+        structures: Number of structures of each sample, before its pieces (samples,).
+        impulse: The impulses.
+        peak: The peak overpressures.
+        site: Index of the site (samples,).
+        scenario: Name of the site, or "" (samples,).
+        case: Index of the combination of site, structure and charge (samples,).
+        layout: Index of the combination of site and layout (samples,).
+    """
+
+    features: FloatArray
+    relations: FloatArray
+    area_m2: FloatArray
+    counts: np.ndarray
+    solids: np.ndarray
+    structures: np.ndarray
+    impulse: Loads
+    peak: Loads
+    site: np.ndarray
+    scenario: np.ndarray
+    case: np.ndarray
+    layout: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.counts)
+
+    @classmethod
+    def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
+        """Return the loads on protected structures of a table of `studies.blast_table`.
+
+        Args:
+            blasts: The table.
+            scenarios: Scenarios by content hash; rows of others are omitted.
+
+        Raises:
+            BlastEnvError: If no row remains.
+        """
+        known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
+        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
+        if rows.empty:
+            raise BlastEnvError("no load of a protected structure of a known scenario")
+        # 1. Each site once; each blast once, with the features of all points of its walls.
+        sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
+        features, related, area_m2, impulses, peaks = [], [], [], [], []
+        standing: list[int] = []
+        wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
+        columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
+        of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
+        for (scenario_hash, layout, *numbers), loads in of_blast:
+            site = sites[scenario_hash]
+            x_m, y_m, height_m, tnt_kg = map(float, numbers)
+            approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
+            barrier = site.barrier(elements(layout))
+            of_points = approach.features(barrier).astype(np.float32)
+            of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
+            names = [structure.name for structure in site.protected]
+            # 2. Of these, the points of each protected structure: a sample.
+            for *_, structure in loads:
+                own = approach.points_of(names.index(structure))
+                features.append(of_points[own])
+                related.append(of_solids[:, own].astype(np.float32))
+                standing.append(len(approach.solids))
+                area_m2.append(approach.area_m2[own])
+                impulses.append(approach.log_impulse[own])
+                peaks.append(approach.log_peak[own])
+        # 3. The samples in a row, and the cases in which layouts compete.
+        place = rows[["scenario_hash", "structure", *_CHARGE]]
+        return cls(
+            features=np.concatenate(features),
+            relations=np.concatenate([thing.reshape(-1, RELATIONS) for thing in related]),
+            area_m2=np.concatenate(area_m2),
+            counts=np.array([len(feature) for feature in features]),
+            solids=np.array([len(thing) for thing in related]),
+            structures=np.array(standing),
+            impulse=Loads(
+                np.concatenate(impulses),
+                np.log(rows["impulse_pa_s"].to_numpy()),
+                IMPULSE_POWER,
+            ),
+            peak=Loads(
+                np.concatenate(peaks),
+                np.log(rows["peak_pa"].to_numpy()),
+                PEAK_POWER,
+            ),
+            site=rows.groupby("scenario_hash").ngroup().to_numpy(),
+            scenario=rows["scenario"].to_numpy(),
+            case=place.groupby(list(place.columns)).ngroup().to_numpy(),
+            layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
+        )
+
+
+def elements(text: str) -> tuple[Element, ...]:
+    """Return the layout of a row of the table."""
+    found = (tuple(load) for load in json.loads(text))
+    return tuple(prediction if len(prediction) == 2 else Piece(*prediction) for prediction in found)
