@@ -1,7 +1,7 @@
 """The atlas of shielding: what walls, rows, fronts and shadows do to the load of a bay."""
 
-from blast_env.atlas.between import Row, numbers_between, rows_between
-from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.between import Row, around_of, numbers_between, rows_between
+from blast_env.atlas.echoes import fronts_among, numbers_of_echoes
 from blast_env.atlas.laws import Factors, FamilyError, Law, Laws, packaged_laws
 from blast_env.atlas.shadow import numbers_of_shadow
 from blast_env.atlas.surroundings import SiteAtlas, Surroundings, Walls
@@ -15,6 +15,8 @@ __all__ = [
     "SiteAtlas",
     "Surroundings",
     "Walls",
+    "around_of",
+    "fronts_among",
     "numbers_between",
     "numbers_of_echoes",
     "numbers_of_shadow",

@@ -50,8 +50,24 @@ _OVER: Final = 1.4
 _CLOSE: Final = 0.4
 """Distance from a bay, m/kg^(1/3), within which the wave falls into the gap and is thrown back."""
 
+_CORNER: Final = 0.5
+"""Distance of a wall beside a bay, m/kg^(1/3), from which waves come back into the corner."""
+
+_CROWD: Final = 3.0  # most that buildings or pieces around a bay count
+_CORNERS: Final = 2.0  # most that walls beside a bay count
+
 _POWER: Final = 4
 """Of what a row takes away, for its weight among several."""
+
+_ECHOES: Final = ("opposite", "beside", "both_sides", "near_opposite", "near_beside")
+"""Numbers of echoes that are also numbers of this law: waves come round an obstacle by them."""
+
+_PIECES: Final = ("beside", "near_beside")
+"""Those of pieces beside the way."""
+
+_OF_PIECES: Final = [ECHOES.index(name) for name in _PIECES]
+
+_OF_ECHOES: Final = [ECHOES.index(name) for name in _ECHOES]
 
 _BEFORE: Final = 0.04  # m/kg^(1/3) before a wall: what lies behind that does not shield it
 
@@ -92,6 +108,74 @@ def lies_before(bays: FloatArray, normal: FloatArray, boxes: FloatArray) -> Bool
     return np.asarray(out - float(bays[0] @ normal) > _BEFORE)
 
 
+def around_of(
+    bays: FloatArray,
+    normal: FloatArray,
+    boxes: FloatArray,
+    buildings: BoolArray,
+    pieces: BoolArray,
+) -> FloatArray:
+    """Return how much bays of a wall lie in a corner and in a crowd (bays, 3).
+
+    Args:
+        bays: Middles of the bays of one wall (bays, 3).
+        normal: Its outward normal (3,).
+        boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
+        buildings: Whether each box is another building than that of a bay (bays, boxes) or
+            (boxes,).
+        pieces: Whether it is a piece, likewise.
+    """
+    corners = corners_of(bays, normal, boxes)
+    return np.column_stack([corners, crowd_of(bays, boxes, buildings, pieces)])
+
+
+def corners_of(bays: FloatArray, normal: FloatArray, boxes: FloatArray) -> FloatArray:
+    """Return how much each bay lies in a corner: walls close beside it, on any side of the charge.
+
+    A wave that comes round an obstacle is thrown back in the corner behind it.
+
+    Args:
+        bays: Middles of the bays of one wall (bays, 3).
+        normal: Its outward normal (3,).
+        boxes: Low x, y, high x, y, base and top of each obstacle (boxes, 6).
+    """
+    own = boxes[lies_before(bays, normal, boxes)]
+    ends = []
+    for axis in (normal[:2], np.array([-normal[1], normal[0]])):
+        first, last = own[:, :2] * axis, own[:, 2:4] * axis
+        ends += [np.minimum(first, last).sum(axis=1), np.maximum(first, last).sum(axis=1)]
+    near, far, left, right = ends
+    plane, across = float(bays[0] @ normal), bays[:, :2] @ np.array([-normal[1], normal[0]])
+    before = np.maximum(near - plane, 0.0)
+    deep = 1.0 - np.exp(-(far - plane - before) / _CORNER)
+    aside = np.maximum(left - across[:, np.newaxis], across[:, np.newaxis] - right)
+    covered = np.clip((own[:, 5] - own[:, 4]) / (bays[:, 2, np.newaxis] + _CORNER), 0.0, 1.0)
+    close = np.where(aside > 0.0, np.exp(-(aside + before) / _CORNER), 0.0)
+    return np.asarray(np.minimum((deep * covered * close).sum(axis=1), _CORNERS))
+
+
+def crowd_of(
+    bays: FloatArray, boxes: FloatArray, buildings: BoolArray, pieces: BoolArray
+) -> FloatArray:
+    """Return how much of what a bay sees all round is filled by buildings, and by pieces (bays, 2).
+
+    Waves go to and fro between them: rows leave more there, and less surely.
+
+    Args:
+        bays: Middles of the bays (bays, 3).
+        boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
+        buildings: See `around_of`.
+        pieces: See `around_of`.
+    """
+    at = bays[:, np.newaxis, :2]
+    away = np.linalg.norm(at - np.clip(at, boxes[:, :2], boxes[:, 2:4]), axis=2)
+    size = np.linalg.norm(boxes[:, 2:4] - boxes[:, :2], axis=1)
+    high = boxes[:, 5] - boxes[:, 4]
+    filled = size / (size + 2.0 * away + _LEAST) * high / (high + 0.5 * away + _LEAST)
+    whole = [np.where(own, filled, 0.0).sum(axis=1) for own in (buildings, pieces)]
+    return np.asarray(np.minimum(np.stack(whole, axis=1), _CROWD))
+
+
 def rows_between(
     charge: FloatArray, bays: FloatArray, normal: FloatArray, boxes: FloatArray
 ) -> list[Row]:
@@ -111,11 +195,12 @@ def rows_between(
     own = boxes[before]
     corners = np.stack([own[:, [0, 1]], own[:, [2, 1]], own[:, [2, 3]], own[:, [0, 3]]])
     crossings = _Crossings.of(np.broadcast_to(charge, bays.shape), bays, own, corners)
-    parts = _Parts.of(crossings, own)
     middle = 0.5 * (own[:, [0, 1]] + own[:, [2, 3]]) @ normal[:2]
     order = np.argsort(middle)
     starts = np.flatnonzero(np.diff(middle[order]) > _TOGETHER) + 1
-    found = (parts.row(members, before[members]) for members in np.split(order, starts))
+    rows = np.split(order, starts)
+    parts = _Parts.of(crossings, own, rows)
+    found = (parts.row(members, before[members]) for members in rows)
     return [row for row in found if row.taken.max() > _NOTHING]
 
 
@@ -139,6 +224,24 @@ class _Crossings(NamedTuple):
     right: FloatArray
     line: FloatArray
     between: BoolArray
+
+    def free_from(self, zone: FloatArray, rows: Sequence[IntArray]) -> FloatArray:
+        """Return where each box begins to take what those on its left in its row leave.
+
+        Args:
+            zone: Square of the width of the bell at each crossing, for a width of 1.
+            rows: The boxes of each row.
+        """
+        begin, unit = self.left.copy(), np.sqrt(zone)
+        for members in (own for own in rows if len(own) > 1):
+            left, right = (own[:, members] / unit[:, members] for own in (self.left, self.right))
+            right = np.where(self.between[:, members], right, -np.inf)
+            order = np.argsort(left, axis=1)
+            reach = np.maximum.accumulate(np.take_along_axis(right, order, axis=1), axis=1)
+            before = np.full_like(left, -np.inf)
+            np.put_along_axis(before, order[:, 1:], reach[:, :-1], axis=1)
+            begin[:, members] = np.clip(before, left, np.maximum(right, left)) * unit[:, members]
+        return begin
 
     @classmethod
     def of(
@@ -194,9 +297,11 @@ class _Parts:
     sided: FloatArray
     across: FloatArray
     over: FloatArray
+    wide: FloatArray
+    free: FloatArray
 
     @classmethod
-    def of(cls, found: _Crossings, boxes: FloatArray) -> "_Parts":
+    def of(cls, found: _Crossings, boxes: FloatArray, rows: Sequence[IntArray]) -> "_Parts":
         """Return the shares of the bells at the crossings; the ground mirrors the bells."""
         from scipy.special import ndtr  # takes a while to import
 
@@ -204,14 +309,19 @@ class _Parts:
         # Only where the widest bell meets the box: most pairs are far aside, or not between.
         widest = _REACH * np.maximum(np.sqrt(WIDTHS[-1] * zone), _LEAST)
         pairs = np.nonzero(found.between & (found.left < widest) & (found.right > -widest))
-        taken, sided = np.zeros((2, *zone.shape, len(WIDTHS)))
+        taken, sided, wide, free = np.zeros((4, *zone.shape, len(WIDTHS)))
         endless, over = np.zeros((2, *zone.shape))
         low_up, high_up = boxes[pairs[1], 4], boxes[pairs[1], 5]
         left, right, line = (own[pairs] for own in (found.left, found.right, found.line))
+        begin = found.free_from(zone, rows)[pairs]
+        overlap = np.flatnonzero(begin > left)
         for k, width in enumerate(WIDTHS):
             bell = np.maximum(np.sqrt(width * zone[pairs]), _LEAST)
             ends = ndtr(right / bell), ndtr(left / bell)
             across = ends[0] - ends[1]
+            alone = across.copy()
+            alone[overlap] = ends[0][overlap] - ndtr(begin[overlap] / bell[overlap])
+            wide[pairs[0], pairs[1], k], free[pairs[0], pairs[1], k] = across, alone
             on_right = np.maximum(ends[0], 0.5) - np.maximum(ends[1], 0.5)
 
             def below(height: FloatArray, bell: FloatArray = bell) -> FloatArray:
@@ -225,11 +335,14 @@ class _Parts:
             if k == _MIDDLE:
                 endless[pairs] = across * (1.0 - base)
                 over[pairs] = across * np.clip(high_up - line, 0.0, _OVER)
-        return cls(found, taken, sided, endless, over)
+        return cls(found, taken, sided, endless, over, wide, free)
 
     def row(self, members: IntArray, indices: IntArray) -> Row:
-        """Return a row of some of the obstacles."""
+        """Return a row of some of the obstacles; those behind others count less."""
         taken = self.taken[:, members]
+        wide, free = (own[:, members].sum(axis=1) for own in (self.wide, self.free))
+        share = np.where(wide > 0.0, free / np.maximum(wide, 1e-30), 1.0)
+        middle = share[:, _MIDDLE]
         weight = taken[..., -1] + 1e-9
         weight = weight / weight.sum(axis=1, keepdims=True)
 
@@ -237,10 +350,10 @@ class _Parts:
             return np.asarray((values[:, members] * weight).sum(axis=1))
 
         return Row(
-            np.minimum(taken.sum(axis=1), 1.0),
-            self.sided[:, members].sum(axis=1),
-            np.minimum(self.across[:, members].sum(axis=1), 1.0),
-            np.minimum(self.over[:, members].sum(axis=1), _OVER),
+            np.minimum(np.maximum(taken.sum(axis=1) * share, taken.max(axis=1)), 1.0),
+            self.sided[:, members].sum(axis=1) * share,
+            np.minimum(self.across[:, members].sum(axis=1) * middle, 1.0),
+            np.minimum(self.over[:, members].sum(axis=1) * middle, _OVER),
             mean(self.crossings.from_charge),
             mean(self.crossings.from_bay),
             mean(self.crossings.thickness),
@@ -255,6 +368,8 @@ def numbers_between(
     normal: FloatArray,
     high: FloatArray,
     fronts: FloatArray,
+    everything: FloatArray,
+    around: FloatArray,
 ) -> FloatArray:
     """Return the numbers of the law of all rows together (bays, numbers), see `NUMBERS`.
 
@@ -264,7 +379,9 @@ def numbers_between(
         bays: Middles of the bays (bays, 3).
         normal: Outward normal of their wall (3,).
         high: Height of the building of each bay (bays,).
-        fronts: Numbers of the echoes of all that stands before the wall (bays, echoes' numbers).
+        fronts: Numbers of the echoes that count apart from rows (bays, echoes' numbers).
+        everything: Those of all that stands before the wall.
+        around: How much each bay lies in a corner and in a crowd, see `around_of` (bays, 3).
     """
     way = charge - bays
     cosine = way @ normal / np.maximum(np.linalg.norm(way, axis=1), _LEAST)
@@ -287,7 +404,9 @@ def numbers_between(
             np.clip(bays[:, 2], *_HIGH),
             np.clip(high, *_BUILDING),
             mean([row.across for row in rows]),
-            fronts[:, ECHOES.index("near_beside")],
+            fronts[:, _OF_ECHOES],
+            np.maximum(everything - fronts, 0.0)[:, _OF_PIECES],
+            around,
             mean([row.over for row in rows]),
             np.exp(-mean([row.from_bay for row in rows]) / _CLOSE),
             np.abs(mean([row.sided for row in rows])[:, _MIDDLE:]),
@@ -306,7 +425,9 @@ NUMBERS: Final[Sequence[str]] = (
     "bay_height",
     "building_height",
     "across",
-    "near_beside",
+    *_ECHOES,
+    *(f"{name}_of_pieces" for name in _PIECES),
+    *("corners", "buildings_around", "pieces_around"),
     "over",
     "close",
     *(f"sided_{width:g}" for width in WIDTHS[_MIDDLE:]),

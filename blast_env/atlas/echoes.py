@@ -38,6 +38,9 @@ NUMBERS: Final[Sequence[str]] = (
 """Names of the columns of `numbers_of_echoes`."""
 
 
+_OPPOSITE: Final = [NUMBERS.index(name) for name in ("opposite", "near_opposite")]
+
+
 @dataclass(frozen=True, eq=False)
 class _Faces:
     """Walls of boxes: a point on each, its normal, its ends along it, and its height."""
@@ -114,6 +117,21 @@ def _reflected(
 
     met = wide * np.maximum(below(faces.top[wall]) - below(faces.base[wall]), 0.0)
     return (bay, wall), ways, longer, met
+
+
+def fronts_among(everything: FloatArray, buildings: FloatArray) -> FloatArray:
+    """Return the numbers of the echoes that count apart from rows (bays, numbers).
+
+    Pieces throw the wave back from behind the charge as buildings do. Those beside the way hide
+    each other: what they throw back is part of the law of rows.
+
+    Args:
+        everything: Numbers of the echoes of all boxes (bays, numbers).
+        buildings: Those of the buildings alone.
+    """
+    found = buildings.copy()
+    found[:, _OPPOSITE] = everything[:, _OPPOSITE]
+    return found
 
 
 def numbers_of_echoes(

@@ -28,6 +28,9 @@ TOLERATED: Final = 1.15
 _UPPER_ENDS: Final = (TOLERATED, 1.0)
 """What the upper ends of impulse and peak may be above what counts: peaks scatter more."""
 
+LOG_WIDEST: Final = 1.0
+"""Logarithm of the widest intervals over those of middling numbers, and of these over the least."""
+
 _BEYOND: Final = 1e-6
 
 
@@ -115,7 +118,8 @@ class Law(BaseModel):
     Attributes:
         numbers: Names of its numbers.
         gates: Share of each number in the gate.
-        widths: Share of each number in the width of the intervals.
+        widths: Weights of the numbers in the logarithm of the intervals' width, which is
+            bounded (numbers, loads).
         least: Least value of each number in the blasts.
         most: Largest one.
         centre: Values taken off each number.
@@ -124,7 +128,7 @@ class Law(BaseModel):
         inner_shift: Its offsets (hidden,).
         outer: Weights of the output (hidden, loads).
         outer_shift: Its offsets (loads,).
-        below: Ends of the intervals below ln(factor), over the width (loads,).
+        below: Ends of the intervals below ln(factor), over their width (loads,).
         above: Ends above it.
         families: Errors by family.
     """
@@ -133,7 +137,7 @@ class Law(BaseModel):
 
     numbers: tuple[str, ...]
     gates: tuple[float, ...]
-    widths: tuple[float, ...]
+    widths: tuple[tuple[float, float], ...]
     least: tuple[float, ...]
     most: tuple[float, ...]
     centre: tuple[float, ...]
@@ -156,12 +160,15 @@ class Law(BaseModel):
         return np.asarray((numbers @ self._arrays.gates).clip(0.0, 2.0))
 
     def width(self, numbers: FloatArray) -> FloatArray:
-        """Return the width of intervals, in units of their ends: 0 without an obstacle (bays,)."""
-        return self._width(numbers, self.gate(numbers))
+        """Return the widths of intervals in units of their ends, 0 without an obstacle.
+
+        One for each load (bays, loads).
+        """
+        return self._width(self._scaled(numbers), self.gate(numbers))
 
     def log_factors(self, numbers: FloatArray) -> FloatArray:
         """Return the logarithms of the factors, in range or not (bays, loads)."""
-        return self._log_factors(numbers, self.gate(numbers))
+        return self._log_factors(self._scaled(numbers), self.gate(numbers))
 
     def in_range(self, numbers: FloatArray) -> BoolArray:
         """Return whether all numbers lie between those of the blasts (bays,)."""
@@ -178,18 +185,27 @@ class Law(BaseModel):
         inside = self.in_range(numbers)
         numbers = np.minimum(np.maximum(numbers, own.least), own.most)
         gate = self.gate(numbers)
-        middle = self._log_factors(numbers, gate)
-        width = self._width(numbers, gate)[:, np.newaxis]
+        scaled = self._scaled(numbers)
+        middle, width = self._log_factors(scaled, gate), self._width(scaled, gate)
         low, high = middle - width * own.below, middle + width * own.above
         return Factors(np.exp(middle), np.exp(low), np.exp(high), inside)
 
-    def _width(self, numbers: FloatArray, gate: FloatArray) -> FloatArray:
-        return np.asarray(np.sqrt(gate) * (1.0 + numbers @ self._arrays.widths))
+    def _scaled(self, numbers: FloatArray) -> FloatArray:
+        return np.asarray((numbers - self._arrays.centre) / self._arrays.scale)
 
-    def _log_factors(self, numbers: FloatArray, gate: FloatArray) -> FloatArray:
+    def _width(self, scaled: FloatArray, gate: FloatArray) -> FloatArray:
+        wider = bounded_width(scaled @ self._arrays.widths)
+        return np.asarray(np.sqrt(gate)[:, np.newaxis] * wider)
+
+    def _log_factors(self, scaled: FloatArray, gate: FloatArray) -> FloatArray:
         own = self._arrays
-        hidden = np.tanh(((numbers - own.centre) / own.scale) @ own.inner + own.inner_shift)
+        hidden = np.tanh(scaled @ own.inner + own.inner_shift)
         return np.asarray(gate[:, np.newaxis] * (hidden @ own.outer + own.outer_shift))
+
+
+def bounded_width(log_width: FloatArray) -> FloatArray:
+    """Return a width of intervals from its logarithm, kept between its bounds."""
+    return np.asarray(np.exp(LOG_WIDEST * np.tanh(log_width / LOG_WIDEST)))
 
 
 class _Arrays(NamedTuple):

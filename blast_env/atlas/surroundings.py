@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.atlas import attached, between, echoes, edges, shadow
 from blast_env.atlas.laws import Factors, Laws, packaged_laws
 from blast_env.site.blast_site import BlastSite
+
+Names = np.ndarray[Any, np.dtype[np.str_]]
 
 _NOTICED: Final = 0.02
 """Change of a load from which surroundings have a name in the answer."""
@@ -198,6 +200,7 @@ class SiteAtlas:
     ) -> tuple[PlaceFactors, list[tuple[IntArray, "_Note"]]]:
         """Return the factors for places of a charge, and what they come from, by their rows."""
         walls, count = self._walls, len(self._walls.middles_m)
+        names = np.array(walls.structures)
         solid = replace(self._solid, boxes=self._solid.boxes / scale)
         own_edges, factors = _ones(len(charges) * count), _ones(len(charges) * count)
         faces, notes = np.zeros(len(charges) * count, dtype=bool), []
@@ -219,7 +222,7 @@ class SiteAtlas:
                     np.tile(walls.ends_m[bays] / scale, (times, 1)),
                 )
                 if is_facing:
-                    own = self._facing(wall, solid)
+                    own = self._facing(wall, solid, np.tile(names[bays], times))
                 else:
                     own = self._away(wall, solid, walls.structures[bays[0]])
                 faces[rows] = is_facing
@@ -229,25 +232,36 @@ class SiteAtlas:
                 notes += [(rows, note) for note in own.notes]
         return PlaceFactors(own_edges, factors, faces), notes
 
-    def _facing(self, wall: "_Wall", solid: Solid) -> "_Around":
-        """Return what shields a wall that faces the charge, and what throws waves back on it."""
+    def _facing(self, wall: "_Wall", solid: Solid, structures: Names) -> "_Around":
+        """Return what shields a wall that faces the charge, and what throws waves back on it.
+
+        Args:
+            wall: The bays.
+            solid: The boxes of the site.
+            structures: Name of the structure of each bay (bays,).
+        """
         count = len(wall.middles)
         every = np.ones(count, dtype=bool)
         own_edges, near = self._edges(wall)
         adjoins = attached.is_attached(wall.middles, wall.normal, solid.boxes)
         before = between.lies_before(wall.middles, wall.normal, solid.boxes)
         before &= ~adjoins | (solid.boxes[:, 4] == 0.0)  # what hangs on the wall is no front
-        fronts = wall.echoes_of(solid.boxes[before])
+        everything = wall.echoes_of(solid.boxes[before])
         has_pieces = bool((before & ~solid.is_building).any())
-        buildings = (
-            wall.echoes_of(solid.boxes[before & solid.is_building]) if has_pieces else fronts
-        )
+        buildings = everything
+        if has_pieces:
+            buildings = wall.echoes_of(solid.boxes[before & solid.is_building])
+        fronts = echoes.fronts_among(everything, buildings)
         factors, notes = Factors.none(count), [near]
         free = solid.only(~adjoins)
         rows = between.rows_between(wall.charge, wall.middles, wall.normal, free.boxes)
         if rows:
+            own_box = structures[:, np.newaxis] == np.array(free.structures)
+            is_other = ~own_box & free.is_building, ~own_box & ~free.is_building
+            around = between.around_of(wall.middles, wall.normal, free.boxes, *is_other)
             numbers = between.numbers_between(
-                rows, wall.charge, wall.middles, wall.normal, wall.high, fronts
+                *(rows, wall.charge, wall.middles, wall.normal, wall.high),
+                *(fronts, everything, around),
             )
             own = self._laws.between.factors(numbers)
             factors = own.where_known()

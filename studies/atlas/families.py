@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from studies.atlas.scenes import MODULES, Box, Scene
+from studies.atlas.yards import yard_scenes
 
 Numbers = Mapping[str, float]
 Ranges = Mapping[str, tuple[float, float]]
@@ -481,6 +482,19 @@ def _table() -> Iterator[Family]:
         "turn": (0.0, 1.0),
     }
     yield Family("slant", "a wall before a front along the way", along, slant, 6, _slant)
+    yard = {"distance": (0.9, 5.0), "facade_height": (0.5, 2.6), "width": (0.6, 4.5)}
+    yard = {**yard, "aside": (-1.0, 1.0), "depth": (0.4, 1.5)}
+    around = {
+        "opposite": (-1.5, 1.7),
+        "wing": (-1.0, 0.9),
+        "next": (-1.8, 1.8),
+        "house": (-1.0, 0.6),
+        "kind": (0.3, 7.0),
+        "share": (0.0, 1.0),
+        "draw": (0.0, 1.0),
+    }
+    title = "pieces between several buildings"
+    yield Family("yard", title, yard, around, 9, yard_scenes)
 
 
 FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _table()})

@@ -7,8 +7,8 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas import Law, Laws
-from blast_env.atlas.between import numbers_between, rows_between
-from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.between import around_of, numbers_between, rows_between
+from blast_env.atlas.echoes import fronts_among, numbers_of_echoes
 from blast_env.atlas.laws import TOLERATED
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
@@ -96,7 +96,7 @@ def inside_rows(groups: Sequence[Group], known: Laws, families: Collection[str])
         for family in (own for own in recipe.families if own in {*families} - judged):
             judged.add(family)
             own = recipe.samples(groups, laws, [family])
-            found, ratio = law.factors(own.numbers), np.exp(own.log_change)
+            found, ratio = own.with_known(law.factors(own.numbers)), np.exp(own.log_change)
             inside = (found.low <= ratio) & (ratio <= found.high)
             over = ratio / found.counted > TOLERATED
             kept = found.in_range
@@ -229,9 +229,13 @@ def wall_case(known: Laws, boxes_m: Sequence[Sequence[float]]) -> tuple[float, f
     charge, bays, normal = _scaled_bays()
     scale = float(np.cbrt(_KG))
     boxes, high = np.array(boxes_m, dtype=float) / scale, np.full(len(bays), 6.0 / scale)
-    fronts = numbers_of_echoes(charge, bays, normal, boxes, high)
+    everything = numbers_of_echoes(charge, bays, normal, boxes, high)
+    none = numbers_of_echoes(charge, bays, normal, boxes[:0], high)
+    fronts = fronts_among(everything, none)
     rows = rows_between(charge, bays, normal, boxes)
-    numbers = numbers_between(rows, charge, bays, normal, high, fronts)
+    none_is = np.zeros(len(boxes), dtype=bool)
+    around = around_of(bays, normal, boxes, none_is, ~none_is)
+    numbers = numbers_between(rows, charge, bays, normal, high, fronts, everything, around)
     factors = known.between.factors(numbers).where_known()
     for law in (known.opposite, known.beside):
         factors = factors.times(law.factors(fronts))

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.atlas import attached, between, echoes, edges, shadow
-from blast_env.atlas.laws import FamilyError, Law, Laws
+from blast_env.atlas.laws import LOG_WIDEST, SMALL, FamilyError, Law, Laws
 from studies.atlas.families import FAMILIES
 from studies.atlas.samples import (
     Bays,
@@ -36,7 +35,10 @@ FOLDS: Final = 6
 _ENDS: Final = (0.05, 0.95)
 _DIGITS: Final = 5
 _STEPS: Final = 600
-_SHARES: Final = (0.0, 0.3, 0.7, 1.5, 3.0, 6.0)
+_ROUGH: Final = 0.02  # of ln(factor): smaller errors are alike
+_POWER: Final = 3.0  # of errors in the width: large ones count
+_OF_MEAN: Final = 0.2  # share of the penalty for the network that follows the mean
+_CALM: Final = 3e-3  # penalty on the weights of widths
 _HELD: Final = 0.9
 _ALIKE: Final = MappingProxyType(
     {"far": "wall", "distant": "pieces"}
@@ -62,29 +64,35 @@ def fit(
 ) -> Law:
     """Return the law of all samples, with intervals and errors by groups left out.
 
+    It follows the mean of the networks that were fitted without each fold: their own errors, which
+    depend on chance, cancel out.
+
     Args:
         found: The samples.
         judged: Families that intervals and errors are of.
         columns: Names of their numbers.
         gates: Share of each number in the gate.
-        wider: Numbers, none of them negative, that make intervals wider if errors grow with them.
+        wider: Numbers that make intervals wider or narrower.
         hidden: Hidden units.
         decay: Weight of the penalty on the weights.
     """
     numbers, target = found.numbers, found.log_change
     folds = folds_of(found.group)
-    left = np.empty_like(target)
+    left, mean = np.empty_like(target), np.zeros_like(target)
     for fold in range(FOLDS):
         rest = folds != fold
         law = _fitted(numbers[rest], target[rest], columns, gates, hidden, decay)
         left[~rest] = law.log_factors(numbers[~rest])
-    law = _fitted(numbers, target, columns, gates, hidden, decay)
+        mean += law.log_factors(numbers) / FOLDS
+    law = _fitted(numbers, mean, columns, gates, hidden, _OF_MEAN * decay)
     kept = np.isin(found.family, [*judged])
-    off = (target - left)[kept]
-    law = _with_intervals(law, numbers[kept], found.family[kept], found.group[kept], off, wider)
-    width = law.width(numbers)[:, np.newaxis]
+    off = found.less_known(target - left)
+    law = _with_intervals(
+        law, numbers[kept], found.family[kept], found.group[kept], off[kept], wider
+    )
+    width = law.width(numbers)
     below, above = np.array(law.below), np.array(law.above)
-    inside = (target >= left - width * below) & (target <= left + width * above)
+    inside = (off >= -width * below) & (off <= width * above)
     families = {}
     for name in judged:
         own = found.family == name
@@ -97,7 +105,7 @@ def fit(
                 error=_pair(np.sqrt(((target - left)[own] ** 2).mean(axis=0))),
                 inside=_pair(inside[own].mean(axis=0)),
             )
-    return law.model_copy(update={"families": families})
+    return _changed(law, families=families)
 
 
 def _with_intervals(
@@ -124,29 +132,59 @@ def _with_intervals(
     kind = np.array([_ALIKE.get(name, name) for name in family.tolist()])
     kinds = [kind == name for name in np.unique(kind)]
     errors = [np.sqrt(_HELD * (1.0 - _HELD) / len(np.unique(group[own]))) for own in kinds]
-    best, least = law, np.inf
-    # (1) Ends of the pooled intervals for each set of widths; (2) how much wider they must be for
-    # the family that they hold worst; (3) the narrowest ones in the mean.
-    for tried in product(_SHARES, repeat=len(wider)):
-        shares = np.zeros(len(law.numbers))
-        shares[[law.numbers.index(name) for name in wider]] = tried
-        own = law.model_copy(update={"widths": tuple(shares.tolist())})
-        width = np.maximum(own.width(numbers)[:, np.newaxis], _LEAST)
-        low, high = np.quantile(off / width, _ENDS, axis=0)
-        ends = np.maximum(-low, _LEAST), np.maximum(high, _LEAST)
-        reach = np.maximum(-off / (width * ends[0]), off / (width * ends[1]))
-        more = np.max(
-            [
-                np.quantile(reach[own], min(_HELD + error, 1.0), axis=0)
-                for own, error in zip(kinds, errors, strict=True)
-            ],
-            axis=0,
-        )
-        wide = float((width * more * (ends[0] + ends[1])).mean())
-        if wide < least:
-            below, above = (_pair(more * end + 10.0**-_DIGITS) for end in ends)
-            best, least = own.model_copy(update={"below": below, "above": above}), wide
-    return best
+    law = _changed(law, widths=_widths(law, numbers, off, wider))
+    width = np.maximum(law.width(numbers), _LEAST)
+    low, high = np.quantile(off / width, _ENDS, axis=0)
+    ends = np.maximum(-low, _LEAST), np.maximum(high, _LEAST)
+    reach = np.maximum(-off / (width * ends[0]), off / (width * ends[1]))
+    more = np.max(
+        [
+            np.quantile(reach[own], min(_HELD + error, 1.0), axis=0)
+            for own, error in zip(kinds, errors, strict=True)
+        ],
+        axis=0,
+    )
+    below, above = (_pair(more * end + 10.0**-_DIGITS) for end in ends)
+    return _changed(law, below=below, above=above)
+
+
+def _changed(law: Law, **more: Any) -> Law:
+    """Return a law with other values; a copy would keep arrays of the old ones."""
+    return Law.model_validate({**law.model_dump(), **more})
+
+
+def _widths(
+    law: Law, numbers: FloatArray, off: FloatArray, wider: Sequence[str]
+) -> tuple[tuple[float, float], ...]:
+    """Return the weights of some numbers in the logarithm of the width, for each load.
+
+    The likeliest ones for errors whose logarithmic density falls with a power of them over the
+    width, with a penalty.
+    """
+    from scipy.optimize import minimize  # takes a while to import
+
+    chosen = [law.numbers.index(name) for name in wider]
+    there = law.gate(numbers) >= SMALL  # where hardly anything stands, widths are small anyway
+    numbers, off = numbers[there], off[there]
+    weights = np.zeros((len(law.numbers), off.shape[1]))
+    z = ((numbers - np.array(law.centre)) / np.array(law.scale))[:, chosen]
+    least = np.maximum(law.width(numbers), _LEAST)
+    for load in range(off.shape[1]) if chosen else ():
+        size = (np.abs(off[:, load]) + _ROUGH) / least[:, load]
+
+        def loss(flat: FloatArray, size: FloatArray = size) -> tuple[float, FloatArray]:
+            bound = np.tanh(z @ flat[1:] / LOG_WIDEST)
+            log_width = flat[0] + LOG_WIDEST * bound
+            over = (size * np.exp(-log_width)) ** _POWER
+            wider = (1.0 - over) * (1.0 - bound**2)
+            slope = np.append((1.0 - over).mean(), z.T @ wider / len(z))
+            slope[1:] += 2.0 * _CALM * flat[1:]
+            value = (log_width + over / _POWER).mean() + _CALM * (flat[1:] ** 2).sum()
+            return float(value), slope
+
+        start = np.append(np.log(size.mean()), np.zeros(len(chosen)))
+        weights[chosen, load] = minimize(loss, start, jac=True, method="L-BFGS-B").x[1:]
+    return tuple(map(_pair, weights))
 
 
 def _pair(values: FloatArray) -> tuple[float, float]:
@@ -198,7 +236,7 @@ def _fitted(
     return Law(
         numbers=tuple(names),
         gates=tuple(gates),
-        widths=(0.0,) * len(names),
+        widths=((0.0, 0.0),) * len(names),
         least=tuple(np.where(np.array(gates) > 0.0, 0.0, lowest).tolist()),
         most=tuple(numbers.max(axis=0).round(_DIGITS).tolist()),
         centre=tuple(centre.tolist()),
@@ -222,7 +260,7 @@ class Recipe:
         numbers_of: Its numbers.
         columns: Their names.
         gates: Share of each in the gate.
-        wider: Numbers that make intervals wider.
+        wider: Numbers that make intervals wider or narrower.
         scenes_of: Yields the scenes of groups with the changes that the law is of.
         less: Laws of echoes whose factors are taken off these changes first.
         also: Families whose blasts it has as well, and which another law judges.
@@ -291,11 +329,14 @@ RECIPES: Final[Mapping[str, Recipe]] = MappingProxyType(
             ("near_opposite", "near_beside"),
         ),
         "between": Recipe(
-            ("wall", "posts", "rows", "raised", "far", "pieces", "shaft", "distant", "slant"),
+            (
+                *("wall", "posts", "rows", "raised", "far", "pieces", "shaft", "distant", "slant"),
+                "yard",
+            ),
             samples_between,
             between.NUMBERS,
             {name: _THIRD for name in between.NUMBERS if name.startswith("taken")},
-            ("close", "charge_height"),
+            tuple(name for name in between.NUMBERS if name != "both_sides"),
             less=("opposite", "beside"),
             also=("tee",),
             hidden=20,

@@ -35,6 +35,7 @@ SHOWN: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
         "pieces": ("high", "height of the higher pieces", "from_charge"),
         "shaft": ("high", "height of the higher pieces", "from_charge"),
         "slant": ("height", "height of the wall", "away"),
+        "yard": ("distance", "distance of the facade", "facade_height"),
         "open": ("facade_height", "height of the front", "distance"),
     }
 )
@@ -96,7 +97,7 @@ def _by_law(axes: "Axes", name: str, scenes: Sequence[Bays], known: Laws) -> Non
     recipe = RECIPES[name]
     laws = [getattr(known, law) for law in recipe.less]
     own = samples(less_echoes(scenes, laws), recipe.numbers_of)
-    found = getattr(known, name).factors(own.numbers)
+    found = own.with_known(getattr(known, name).factors(own.numbers))
     measured: FloatArray = np.exp(own.log_change[:, 0])
     says = found.middle[:, 0]
     low, high = min(measured.min(), says.min()), max(measured.max(), says.max())

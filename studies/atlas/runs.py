@@ -24,7 +24,7 @@ FINE: Final = GasEngine(cell_m=0.5 * MODULE_SIDE_M)
 """Halved cells."""
 
 OF_A_ROUND: Final = MappingProxyType(
-    {"shadow": 4, "rows": 2, "tee": 2, "open": 2, "near": 2, "beyond": 2}
+    {"shadow": 4, "rows": 2, "tee": 2, "open": 2, "near": 2, "beyond": 2, "yard": 4}
 )
 """Groups of a round of families whose groups have few blasts; one of the others."""
 

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.atlas.attached import numbers_of_attached
-from blast_env.atlas.between import WIDTHS, Row, numbers_between, rows_between
-from blast_env.atlas.echoes import numbers_of_echoes
+from blast_env.atlas.between import WIDTHS, Row, around_of, numbers_between, rows_between
+from blast_env.atlas.echoes import fronts_among, numbers_of_echoes
 from blast_env.atlas.edges import NUMBERS as EDGES
 from blast_env.atlas.edges import is_against, numbers_of_edges, to_the_wall
-from blast_env.atlas.laws import SMALL, Law
+from blast_env.atlas.laws import SMALL, Factors, Law
 from blast_env.atlas.shadow import numbers_of_shadow
 from blast_env.curves import Ways, in_the_open
 from studies.atlas.scenes import CUBE_ROOT, MODULES
@@ -22,6 +23,9 @@ Group = Mapping[str, Any]
 
 LEAST_DISTANCE: Final = 1.3
 """Nearest bays of the law of edges, m/kg^(1/3); walls may be breached from 1.7 inwards."""
+
+OF_PIECES: Final = ("wall", "posts", "raised", "far", "pieces", "shaft", "distant", "slant")
+"""Families whose boxes are pieces of layouts; of others the first ones are buildings."""
 
 OPEN: Final = "open"
 """Family of walls in the open; the first scenes of the others count among them."""
@@ -42,6 +46,7 @@ class Bays:
         boxes: Low x, y, high x, y, base and top of other boxes (boxes, 6).
         judged: The box with the bays (6,).
         log_change: Logarithms of the impulse and the peak over those without obstacle (bays, 2).
+        known: Ends below and above of the intervals of what was taken off that (2, bays, 2).
     """
 
     family: str
@@ -54,6 +59,13 @@ class Bays:
     boxes: FloatArray
     judged: FloatArray
     log_change: FloatArray
+    known: FloatArray | None = None
+
+    @property
+    def is_building(self) -> BoolArray:
+        """Whether each other box is a building, not a piece of a layout (boxes,)."""
+        houses = self.numbers.get("houses", 0 if self.family in OF_PIECES else len(self.boxes))
+        return np.arange(len(self.boxes)) < houses
 
     @property
     def high(self) -> FloatArray:
@@ -158,6 +170,8 @@ class Samples:
         family: Family of each bay (bays,).
         group: Family and group (bays,).
         scene: Family, group and scene (bays,).
+        known: Ends of the intervals of what was taken off the changes before, below and above (2,
+            bays, 2).
     """
 
     numbers: FloatArray
@@ -165,6 +179,21 @@ class Samples:
     family: np.ndarray[Any, np.dtype[np.str_]]
     group: np.ndarray[Any, np.dtype[np.str_]]
     scene: np.ndarray[Any, np.dtype[np.str_]]
+    known: FloatArray
+
+    def with_known(self, own: Factors) -> Factors:
+        """Return factors with the intervals of what was taken off as well."""
+        one = np.ones_like(own.middle)
+        low, high = np.exp(-self.known[0]), np.exp(self.known[1])
+        return own.times(Factors(one, low, high, own.in_range))
+
+    def less_known(self, off: FloatArray) -> FloatArray:
+        """Return what errors are beyond the intervals of what was taken off (bays, 2).
+
+        Intervals of factors that multiply add up by their squares.
+        """
+        known = np.where(off < 0.0, self.known[0], self.known[1])
+        return np.asarray(np.sign(off) * np.sqrt(np.maximum(off**2 - known**2, 0.0)))
 
 
 Numbers = Callable[[Bays], tuple[FloatArray, BoolArray]]
@@ -172,7 +201,7 @@ Numbers = Callable[[Bays], tuple[FloatArray, BoolArray]]
 
 def samples(scenes: Iterable[Bays], numbers_of: Numbers) -> Samples:
     """Return the samples of a law, of bays that it is for."""
-    numbers, changes, families, groups, names = [], [], [], [], []
+    numbers, changes, families, groups, names, known = [], [], [], [], [], []
     for bays in scenes:
         own, chosen = numbers_of(bays)
         count = int(chosen.sum())
@@ -180,6 +209,8 @@ def samples(scenes: Iterable[Bays], numbers_of: Numbers) -> Samples:
             continue
         numbers.append(own[chosen])
         changes.append(bays.log_change[chosen])
+        nothing = np.zeros((2, len(chosen), 2))
+        known.append((nothing if bays.known is None else bays.known)[:, chosen])
         families += [bays.family] * count
         groups += [f"{bays.family}/{bays.group}"] * count
         names += [f"{bays.family}/{bays.group}/{bays.scene}"] * count
@@ -189,6 +220,7 @@ def samples(scenes: Iterable[Bays], numbers_of: Numbers) -> Samples:
         np.array(families),
         np.array(groups),
         np.array(names),
+        np.concatenate(known, axis=1),
     )
 
 
@@ -199,13 +231,23 @@ def less_echoes(scenes: Iterable[Bays], laws: Sequence[Law]) -> Iterator[Bays]:
         return
     for bays in scenes:
         found = fronts_of(bays)
-        echo = np.sum([np.log(law.factors(found).middle) for law in laws], axis=0)
-        yield replace(bays, log_change=bays.log_change - echo)
+        echo = reduce(Factors.times, [law.factors(found) for law in laws])
+        middle, low, high = (np.log(part) for part in echo[:3])
+        known = np.stack([middle - low, high - middle])
+        yield replace(bays, log_change=bays.log_change - middle, known=known)
 
 
 def fronts_of(bays: Bays) -> FloatArray:
-    """Return the numbers of the echoes of all other boxes (bays, numbers)."""
-    return numbers_of_echoes(bays.charge, bays.middles, bays.normals[0], bays.boxes, bays.high)
+    """Return the numbers of the echoes that count apart from rows (bays, numbers)."""
+    everything = echoes_of(bays, bays.boxes)
+    if bays.is_building.all():
+        return everything
+    return fronts_among(everything, echoes_of(bays, bays.boxes[bays.is_building]))
+
+
+def echoes_of(bays: Bays, boxes: FloatArray) -> FloatArray:
+    """Return the numbers of the echoes of some boxes (bays, numbers)."""
+    return numbers_of_echoes(bays.charge, bays.middles, bays.normals[0], boxes, bays.high)
 
 
 def rows_of(bays: Bays) -> list[Row]:
@@ -215,8 +257,11 @@ def rows_of(bays: Bays) -> list[Row]:
 
 def numbers_of(bays: Bays, rows: Sequence[Row]) -> FloatArray:
     """Return the numbers of some rows together (bays, numbers)."""
+    normal = bays.normals[0]
+    around = around_of(bays.middles, normal, bays.boxes, bays.is_building, ~bays.is_building)
+    fronts, everything = fronts_of(bays), echoes_of(bays, bays.boxes)
     return numbers_between(
-        rows, bays.charge, bays.middles, bays.normals[0], bays.high, fronts_of(bays)
+        rows, bays.charge, bays.middles, normal, bays.high, fronts, everything, around
     )
 
 

@@ -6,7 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
-from blast_env.atlas import Factors, numbers_between, numbers_of_echoes, packaged_laws, rows_between
+from blast_env.atlas import (
+    Factors,
+    around_of,
+    fronts_among,
+    numbers_between,
+    numbers_of_echoes,
+    packaged_laws,
+    rows_between,
+)
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import Scenario
 from tests import builders
@@ -16,31 +24,41 @@ CHARGE = np.zeros(3)
 BAYS = np.array([[2.2, 0.0, 0.3], [2.2, 0.7, 0.3], [2.2, 0.0, 0.9]])
 TOWARDS = np.array([-1.0, 0.0, 0.0])
 HIGH = np.full(len(BAYS), 1.3)
+NOTHING = np.zeros((0, 6))
 
 
 def wall(high: float, at: float = 0.7, long: float = 4.0, thick: float = 0.1) -> FloatArray:
     return np.array([[at, -0.5 * long, at + thick, 0.5 * long, 0.0, high]])
 
 
-def behind(boxes: FloatArray, charge: FloatArray = CHARGE, bays: FloatArray = BAYS) -> Factors:
-    """Return what the rows of some boxes do, in and out of range."""
-    high = np.full(len(bays), 1.3)
-    fronts = numbers_of_echoes(charge, bays, TOWARDS, boxes, high)
-    rows = rows_between(charge, bays, TOWARDS, boxes)
+def behind(
+    boxes: FloatArray,
+    charge: FloatArray = CHARGE,
+    bays: FloatArray = BAYS,
+    houses: FloatArray = NOTHING,
+) -> Factors:
+    """Return what the rows of some pieces, and of houses, do, in and out of range."""
+    high, every = np.full(len(bays), 1.3), np.concatenate([houses, boxes])
+    everything, buildings = (
+        numbers_of_echoes(charge, bays, TOWARDS, own, high) for own in (every, houses)
+    )
+    rows = rows_between(charge, bays, TOWARDS, every)
     if not rows:
         return Factors.none(len(bays))
-    numbers = numbers_between(rows, charge, bays, TOWARDS, high, fronts)
+    is_house = np.arange(len(every)) < len(houses)
+    around = around_of(bays, TOWARDS, every, is_house, ~is_house)
+    fronts = fronts_among(everything, buildings)
+    numbers = numbers_between(rows, charge, bays, TOWARDS, high, fronts, everything, around)
     return packaged_laws().between.factors(numbers).where_known()
 
 
 def test_without_an_obstacle_the_factor_is_exactly_one() -> None:
-    nothing = np.zeros((0, 6))
     far_behind = wall(1.0) + np.array([5.0, 0.0, 5.0, 0.0, 0.0, 0.0])
-    for boxes in (nothing, far_behind):
+    for boxes in (NOTHING, far_behind):
         found = behind(boxes)
         assert (found.low == 1.0).all()
         assert (found.high == 1.0).all()
-    numbers = numbers_of_echoes(CHARGE, BAYS, TOWARDS, nothing, HIGH)
+    numbers = numbers_of_echoes(CHARGE, BAYS, TOWARDS, NOTHING, HIGH)
     for law in (packaged_laws().opposite, packaged_laws().beside):
         found = law.factors(numbers)
         assert np.stack(found[:3]) == pytest.approx(1.0, abs=1e-12)
@@ -85,6 +103,33 @@ def test_rows_count_in_any_order_and_a_second_one_does_not_harm() -> None:
     first, second = (behind(np.concatenate(pair)) for pair in ((near, far), (far, near)))
     assert first.middle == pytest.approx(second.middle, rel=1e-12)
     assert first.middle[:, 0].mean() < behind(near).middle[:, 0].mean() + 0.02
+
+
+def test_pieces_that_hide_each_other_count_once() -> None:
+    """Two walls just one behind the other take hardly more of the way than one of them."""
+    (one,) = rows_between(CHARGE, BAYS, TOWARDS, wall(0.6))
+    (two,) = rows_between(
+        CHARGE, BAYS, TOWARDS, np.concatenate([wall(0.6, at=0.6), wall(0.6, at=0.8)])
+    )
+    assert (two.taken < 1.1 * one.taken + 0.01).all()
+    (parts,) = rows_between(CHARGE, BAYS, TOWARDS, halves(wall(0.6)))
+    assert parts.taken == pytest.approx(one.taken, abs=0.01)
+
+
+def halves(box: FloatArray) -> FloatArray:
+    """Return a wall as two pieces, side by side."""
+    lower, upper = box.copy(), box.copy()
+    lower[0, 3] = upper[0, 1] = 0.3
+    return np.concatenate([lower, upper])
+
+
+def test_intervals_are_wider_among_buildings() -> None:
+    """There waves go to and fro, on ways that the law does not know."""
+    houses = np.array([[-0.9, -2.0, -0.5, 2.0, 0.0, 1.2], [0.6, 1.2, 2.2, 1.5, 0.0, 1.2]])
+    alone, among = behind(wall(0.65, long=2.0)), behind(wall(0.65, long=2.0), houses=houses)
+    width = [np.log(found.high / found.middle)[:, 0] for found in (alone, among)]
+    assert (width[1] > width[0]).all()
+    assert width[1].mean() > 1.2 * width[0].mean()
 
 
 def test_a_wall_across_the_way_along_a_front_shields_it() -> None:

@@ -65,7 +65,7 @@ LOW_BY: Final = 1.02
 ground (`python -m studies.response raised --cell 0.25 --distances 5,6.5,8 --heights
 0,0.2,2,3,4,5`)."""
 
-BEHIND_LOW_BY: Final = 2.1
+BEHIND_LOW_BY: Final = 1.48
 """Largest impulse of gas over screening's behind rows, on sites that no law of the atlas has met
 (docs/engineers/atlas.md)."""
 
