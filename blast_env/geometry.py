@@ -266,7 +266,7 @@ Layout = tuple[Element, ...]
 
 def standing(layout: "Iterable[Element]") -> "Layout":
     """Return the elements of a layout that stand on the ground: all but its measures."""
-    return tuple(element for element in layout if not isinstance(element, Measure))
+    return tuple([element for element in layout if not isinstance(element, Measure)])
 
 
 def layout_text(layout: Iterable[Element]) -> str:

@@ -162,6 +162,9 @@ def conditional_value_at_risk(values: FloatArray, level: float) -> float:
         BlastEnvError: If the level is out of bounds.
     """
     check_cvar_level(level)
+    if len(values) == 1:  # the usual case of an episode; with the rounding of the sums below
+        share = 1.0 - level
+        return float(share * values[0] / share)
     # Whole values first, then the part of the next one that is left of the share 1 - level.
     worst_first = np.sort(values)[::-1]
     tail = (1.0 - level) * len(values)

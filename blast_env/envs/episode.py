@@ -439,28 +439,33 @@ class Episodes:
             actions: One of its `ActionNumbers` for each.
         """
         chosen, layouts = np.array(indices), self.layouts
+        rows = slice(None) if len(chosen) == len(self.running) else chosen  # all without copies
         wanted = np.array(actions)
         # 1. What the actions do; the masks are those before them.
         found = self._all_made(chosen, wanted)
-        self._before[chosen] = layouts.placed[chosen]
-        self._begins[chosen] = ~self._has_begun[chosen]
-        self._has_begun[chosen] = True
-        places = found >= 0
+        self._before[rows] = layouts.placed[rows]
+        self._begins[rows] = ~self._has_begun[rows]
+        self._has_begun[rows] = True
         # 2. Elements are placed, in all layouts at once.
-        layouts.place(chosen[places], found[places])
+        places = found >= 0
+        if places.all():
+            layouts.place(chosen, found)
+        else:
+            layouts.place(chosen[places], found[places])
         # 3. Illegal actions change nothing. Repeated, or too many, they end the episode: a policy
         # that is deterministic would repeat one for ever.
         stops, illegal = found == _FINISHES, found == _ILLEGAL
-        for position in np.flatnonzero(illegal).tolist():
+        for position in illegal.nonzero()[0].tolist():
             index = indices[position]
             episode = self.running[index]
             episode.without_effect += 1
             repeats = self.task.illegal.moves and wanted[position] == self._repeated[index]
             stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
         # 4. Who has finished or filled the zone, and the final layouts.
-        self._repeated[chosen] = np.where(illegal, wanted, _NO_ACTION)
-        self.ended[chosen] = stops | layouts.is_full[chosen]
-        self._ended_now = chosen[self.ended[chosen]].tolist()
+        self._repeated[rows] = np.where(illegal, wanted, _NO_ACTION)
+        ended = stops | layouts.is_full[rows]
+        self.ended[rows] = ended
+        self._ended_now = chosen[ended].tolist()
         for index in self._ended_now:
             self.running[index].final = layouts.checked(index)
         if self._of_turns is not None:
@@ -490,7 +495,7 @@ class Episodes:
             found[wanted == actions.finish] = _FINISHES
         else:
             found = np.full(len(chosen), _ILLEGAL)
-        for position in np.flatnonzero(found == _ILLEGAL).tolist():
+        for position in (found == _ILLEGAL).nonzero()[0].tolist():
             found[position] = self._made(int(chosen[position]), int(wanted[position]))
         return found
 
@@ -557,19 +562,20 @@ class Episodes:
             BlastEnvError: If the terms differ from those that the reward names.
         """
         chosen = np.asarray(indices)
-        self.terms[chosen] = 0.0
+        rows = slice(None) if len(chosen) == len(self.running) else chosen
+        self.terms[rows] = 0.0
         # A reward at the ends pays at the first and the last action alone.
-        paid = chosen if self._of_turns else chosen[self._begins[chosen] | self.ended[chosen]]
+        paid = chosen if self._of_turns else chosen[self._begins[rows] | self.ended[rows]]
         if len(paid):
             self.terms[paid, :-1] = self._paid(paid)
         # The cost of illegal actions is a term of its own.
-        without_effect = chosen[self._repeated[chosen] != _NO_ACTION]
+        without_effect = chosen[self._repeated[rows] != _NO_ACTION]
         if len(without_effect):
             self.terms[without_effect, -1] = -self.task.illegal.cost
         rewards: FloatArray = np.zeros(len(chosen))
         if not len(paid) and not len(without_effect):  # the usual case of one episode
             return rewards
-        for of_term in self.terms[chosen].T:  # one by one: the same sum of one row or of many
+        for of_term in self.terms[rows].T:  # one by one: the same sum of one row or of many
             rewards += of_term
         return rewards
 
@@ -630,9 +636,9 @@ class Episodes:
         """
         actions = self.running[indices[0]].shown.actions
         masks = np.zeros((len(indices), actions.finish + 1), dtype=np.int8)
-        are_all = len(indices) == len(self.running)
+        rows = slice(None) if len(indices) == len(self.running) else list(indices)
         if actions.are_plain:
-            legal = self.layouts.legal if are_all else self.layouts.legal[list(indices)]
+            legal = self.layouts.legal[rows]
             masks[:, :-1] = legal.reshape(len(legal), -1)
             masks[:, -1] = 1
         else:
@@ -641,8 +647,9 @@ class Episodes:
                 masks[position] = of_episode.mask(self._choice(index))
         # An episode that has ended waits for `reset`: one legal action, or masked sampling would
         # fail.
-        over = self.ended[list(indices)]
-        masks[over, :-1], masks[over, -1] = 0, 1
+        over = self.ended[rows]
+        if over.any():
+            masks[over, :-1], masks[over, -1] = 0, 1
         return self.code.masks(masks)
 
     def information(self, index: int) -> dict[str, Any]:

@@ -112,10 +112,11 @@ def stand_offs_m(episodes: Sequence[Observable], placements: Placements) -> Floa
             found[position] = nan
     for (_, grounds), own in groups.items():
         table, counts = placements.rules[own[0]].obstacles, placements.placed[own]
-        layouts = placements.numbers[own, : counts.max()]
-        table.learn(layouts[np.arange(layouts.shape[1]) < counts[:, np.newaxis]])
-        arrays = table.boxes_m, table.kinds, layouts, counts
-        found[own] = np.min([ground.stand_offs_m(*arrays) for ground in grounds], axis=0)
+        arrays = table.boxes_m, table.kinds, placements.numbers[own], counts
+        nearest_m = grounds[0].stand_offs_m(*arrays)
+        for ground in grounds[1:]:
+            nearest_m = np.minimum(nearest_m, ground.stand_offs_m(*arrays))
+        found[own] = nearest_m
     # 2. The others one by one.
     for position in np.flatnonzero(np.isnan(found)).tolist():
         found[position] = episodes[position].stand_off_m(placements.layout(position))

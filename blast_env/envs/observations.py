@@ -29,7 +29,9 @@ from blast_env.envs.observable import (
 from blast_env.envs.planes import GridObservation, ImageEpisode, ImageObservation
 from blast_env.errors import BlastEnvError
 from blast_env.layout.batch import Placements
-from blast_env.site import AnySource, Scenario
+from blast_env.site import (
+    Scenario,
+)
 from blast_env.site.zone import source_bounds_m
 
 MOST_STRUCTURES: Final = 8
@@ -130,21 +132,18 @@ class FeaturesObservation:
         scenario, kept = observable.scenario, observable.of_site
         if "features" not in kept:
             kept["features"] = _site_features(scenario)
-        of_structures, others, variants = kept["features"]
-        charge = _charge_and_corner(scenario, observable.sources)
-        return FeaturesEpisode(
-            np.concatenate((charge, of_structures, others)).clip(0.0, 1.0).astype(np.float32),
-            variants,
-            observable,
-        )
+        of_site, variants = kept["features"]
+        charge = [min(max(value, 0.0), 1.0) for value in _charge_and_corner(observable)]
+        constants = np.concatenate((np.array(charge, dtype=np.float32), of_site))
+        return FeaturesEpisode(constants, variants, observable)
 
 
-def _site_features(scenario: Scenario) -> tuple[FloatArray, FloatArray, Plane]:
-    """Return the constant values of a site: structures, costs and items, and of variants."""
+def _site_features(scenario: Scenario) -> tuple[Plane, Plane]:
+    """Return the constant values of a site: structures, costs and items; and of variants."""
     structures, zone = _structures(scenario), scenario.zone
     items = (structures[:, -1], *item_values(zone)) if zone.items else ()
-    others = np.concatenate((cost_shares(zone).ravel(), *items))
-    return structures[:, :-1].ravel(), others, variant_values(zone)
+    parts = structures[:, :-1].ravel(), cost_shares(zone).ravel(), *items
+    return np.concatenate(parts).clip(0.0, 1.0).astype(np.float32), variant_values(zone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,11 +264,11 @@ class DictObservation:
 
     def episode(self, observable: Observable) -> "DictEpisode":
         """Compute the constant values."""
-        scenario, sources = observable.scenario, observable.sources
-        items = item_values(scenario.zone) if scenario.zone.items else ()
+        zone = observable.scenario.zone
+        items = item_values(zone) if zone.items else ()
         return DictEpisode(
             self.planes.episode(observable),
-            np.concatenate((_charge_and_corner(scenario, sources), *items)),
+            np.concatenate((_charge_and_corner(observable), *items)),
             observable,
         )
 
@@ -301,17 +300,18 @@ class DictEpisode(BatchObservation):
         return {"planes": planes, "vector": _joined(parts)}
 
 
-def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> FloatArray:
+def _charge_and_corner(observable: Observable) -> list[float]:
     """Return the box around the charge, its masses and the corner of the build zone (8,)."""
-    size = np.array([scenario.site.width_m, scenario.site.height_m])
-    boxes = np.array([source_bounds_m(source) for source in sources])
-    charges = [charge_share(source.tnt_kg) for source in sources]
-    return np.concatenate(
-        (
-            *(boxes[:, :2].min(axis=0) / size, boxes[:, 2:].max(axis=0) / size),
-            *([min(charges), max(charges)], np.array(scenario.zone.corner_m) / size),
-        )
-    )
+    site, zone = observable.scenario.site, observable.scenario.zone
+    boxes = [source_bounds_m(source) for source in observable.sources]
+    left_m, bottom_m, right_m, top_m = zip(*boxes, strict=True)
+    charges = [charge_share(source.tnt_kg) for source in observable.sources]
+    return [
+        *(min(left_m) / site.width_m, min(bottom_m) / site.height_m),
+        *(max(right_m) / site.width_m, max(top_m) / site.height_m),
+        *(min(charges), max(charges)),
+        *(zone.corner_m[0] / site.width_m, zone.corner_m[1] / site.height_m),
+    ]
 
 
 def _stand_offs(episodes: Sequence[Observable], placements: Placements) -> FloatArray:

@@ -18,6 +18,7 @@ from blast_env.site.zone import BuildZone
 
 if TYPE_CHECKING:
     from blast_env.layout.obstacles import ObstacleTable
+    from blast_env.vehicles.access_way import AccessWay
 
 _MOST_ROOMS: Final = 4
 _NOBODY: Final = 3
@@ -51,6 +52,14 @@ class PlacementRules:
         if found is None:
             found = self._elements[number] = self.catalogue.element(number)
         return found
+
+    @cached_property
+    def limits(self) -> tuple[FloatArray, float, float, float]:
+        """The costs, the budget (NaN without one), the same with an allowance, and `dearest`."""
+        zone = self.zone
+        if zone.budget is None:
+            return self.costs, np.nan, np.nan, self.dearest
+        return self.costs, zone.budget, zone.cost_limit, self.dearest
 
     @cached_property
     def obstacles(self) -> "ObstacleTable":
@@ -157,44 +166,35 @@ class LayoutBatch:
         """
         if not len(indices):
             return
-        from blast_env.layout.batch_kernels import find_full, place  # Numba takes long to import
+        from blast_env.layout.batch_kernels import place  # Numba takes long to import
 
         indices, numbers = np.asarray(indices), np.asarray(numbers)
-        self._numbers[indices, self.placed[indices]] = numbers
-        self.placed[indices] += 1
-        arrays = self.legal, self.occupancy, self.table, self.left
-        place(indices, numbers, self.rules[indices[0]].variants, *arrays)
+        arrays = self.legal, self.occupancy, self.table, self.left, self._numbers, self.placed
         # Budgets and access ways are those of a site: layouts on one site at once.
         sites = self._sites[indices]
         distinct = dict.fromkeys(sites.tolist())
         for site in distinct:
-            own = indices if len(distinct) == 1 else indices[sites == site]
-            self._limit_to_budget(own)
-            self._keep_open(own)
-        find_full(indices, self.legal, self.is_full)
+            own, added = indices, numbers
+            if len(distinct) > 1:
+                is_own = sites == site
+                own, added = indices[is_own], numbers[is_own]
+            rules = self.rules[own[0]]
+            place(
+                own, added, rules.variants, *arrays, self.budget_left, self.is_full, *rules.limits
+            )
+            if rules.zone.access_way is not None:
+                self._keep_open(own, rules.zone.access_way)
 
-    def _limit_to_budget(self, indices: IntArray) -> None:
-        """Take away places beyond the budget, in layouts of the same rules."""
-        from blast_env.layout.batch_kernels import limit_to_budget  # as in `place`
-
-        rules = self.rules[indices[0]]
-        if rules.zone.budget is None:
-            return
-        layouts = indices, self._numbers, self.placed, self.budget_left, self.legal
-        limits = rules.zone.budget, rules.zone.cost_limit, rules.dearest
-        limit_to_budget(*layouts, rules.costs, *limits)
-
-    def _keep_open(self, indices: IntArray) -> None:
+    def _keep_open(self, indices: IntArray, way: "AccessWay") -> None:
         """Take away places that would close the access way, in layouts of the same rules."""
-        from blast_env.vehicles.access_kernels import keep_open  # as in `place`
+        from blast_env.layout.batch_kernels import find_full  # as in `place`
+        from blast_env.vehicles.access_kernels import keep_open
 
         rules = self.rules[indices[0]]
-        way = rules.zone.access_way
-        if way is None:
-            return
         sizes = np.ascontiguousarray(rules.variants[:, :2])
         arrays = rules.passable, self.occupancy, sizes
         keep_open(indices, *arrays, way.width_cells, way.is_upwards, self.legal)
+        find_full(indices, self.legal, self.is_full)
 
     def elements(self, index: int) -> Layout:
         """Return the elements of a layout, in the order of placement."""

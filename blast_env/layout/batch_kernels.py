@@ -1,5 +1,7 @@
 """Placement in many layouts at once, compiled."""
 
+from math import isnan
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -17,8 +19,55 @@ def place(
     occupancy: NDArray[np.uint8],
     table: NDArray[np.int8],
     left: IntArray,
+    all_numbers: IntArray,
+    placed: IntArray,
+    budget_left: FloatArray,
+    is_full: BoolArray,
+    costs: FloatArray,
+    budget: float,
+    most: float,
+    dearest: float,
 ) -> None:
-    """Place an element in each of some layouts; arrays as in `PlacementRules`, `LayoutBatch`."""
+    """Place an element in each of some layouts on one site, and take away what it forbids.
+
+    Args:
+        indices: The layouts.
+        numbers: Number of the element for each.
+        variants: See `PlacementRules`.
+        legal: See `LayoutBatch`; as the others, updated in place.
+        occupancy: See `LayoutBatch`.
+        table: See `LayoutBatch`.
+        left: See `LayoutBatch`.
+        all_numbers: Numbers of the elements of all layouts (layouts, most elements).
+        placed: See `LayoutBatch`.
+        budget_left: See `LayoutBatch`.
+        is_full: See `LayoutBatch`.
+        costs: Cost by the element's number, in any shape.
+        budget: The budget; NaN without one.
+        most: The same with an allowance for rounding.
+        dearest: The largest cost at a legal place.
+    """
+    for index, number in zip(indices, numbers):  # noqa: B905  # not known to Numba
+        all_numbers[index, placed[index]] = number
+        placed[index] += 1
+    _put(indices, numbers, variants, legal, occupancy, table, left)
+    if not isnan(budget):
+        limits = budget, most, dearest
+        _limit_to_budget(indices, all_numbers, placed, budget_left, legal, costs, *limits)
+    find_full(indices, legal, is_full)
+
+
+@njit(nogil=True)
+def _put(
+    indices: IntArray,
+    numbers: IntArray,
+    variants: IntArray,
+    legal: BoolArray,
+    occupancy: NDArray[np.uint8],
+    table: NDArray[np.int8],
+    left: IntArray,
+) -> None:
+    """Place an element in each of some layouts; see `place`."""
     _, count, rows, columns = legal.shape
     for index, number in zip(indices, numbers):  # noqa: B905  # not known to Numba
         variant, cell = number // (rows * columns), number % (rows * columns)
@@ -97,8 +146,8 @@ def _exact_costs(
     return found
 
 
-@compiled(nogil=True)
-def limit_to_budget(
+@njit(nogil=True)
+def _limit_to_budget(
     indices: IntArray,
     numbers: IntArray,
     placed: IntArray,
@@ -109,17 +158,7 @@ def limit_to_budget(
     most: float,
     dearest: float,
 ) -> None:
-    """Take away the places of some layouts that cost more than what is left of the budget.
-
-    Args:
-        numbers: Numbers of the elements of all layouts (layouts, most elements).
-        placed: Number of elements in each (layouts,).
-        budget_left: What is left of the budget, updated in place (layouts,).
-        legal: See `LayoutBatch`; updated in place.
-        costs: Cost by the element's number, in any shape.
-        most: The same with an allowance for rounding.
-        dearest: The largest cost at a legal place.
-    """
+    """Take away the places of some layouts that cost more than the budget leaves; see `place`."""
     flat = costs.reshape(-1)
     for index, spent in zip(indices, _exact_costs(indices, numbers, placed, costs)):  # noqa: B905
         # What is spent only grows. Until it reaches what the dearest place leaves, nothing changes.

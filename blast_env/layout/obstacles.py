@@ -6,12 +6,20 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray, IntArray
-from blast_env.geometry import Element, standing
-from blast_env.site.catalogue import Catalogue, element_text
+from blast_env.arrays import FloatArray
+from blast_env.geometry import Element, Rectangle, standing
+from blast_env.site.catalogue import Catalogue, Variant, element_text
 from blast_env.site.models import Scenario
-from blast_env.site.terraces import ground_below_m
-from blast_env.vehicles.crash_rating import NOTHING, OTHER, SOLID, STOPS, CrashPiece, Obstacles
+from blast_env.site.terraces import ground_below_m, ground_m
+from blast_env.units import MODULE_SIDE_M
+from blast_env.vehicles.crash_rating import (
+    NOTHING,
+    OTHER,
+    SOLID,
+    STOPS,
+    CrashPiece,
+    Obstacles,
+)
 
 
 def obstacles_of(scenario: Scenario, layout: Iterable[Element]) -> Obstacles:
@@ -20,19 +28,18 @@ def obstacles_of(scenario: Scenario, layout: Iterable[Element]) -> Obstacles:
     Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
     terrace are out of reach, and no obstacles.
     """
-    met, parts = scenario.obstacles_met, list[Obstacles]()
+    met = scenario.obstacles_met
+    stops, solid, rated = list[Rectangle](), list[Rectangle](), list[CrashPiece]()
     # In the order of their places, so that equal layouts have equal obstacles, and one search.
     for element in sorted(standing(layout)):
         found = met.get(element)
         if found is None:
             found = met[element] = _obstacle_of(scenario, element)
-        parts.append(found)
-    stops, solid, rated = zip(*parts, strict=True) if parts else ((), (), ())
-    return Obstacles(
-        tuple([part for own in stops for part in own]),
-        tuple([part for own in solid for part in own]),
-        tuple([part for own in rated for part in own]),
-    )
+        own_stops, own_solid, own_rated = found
+        stops += own_stops
+        solid += own_solid
+        rated += own_rated
+    return Obstacles(tuple(stops), tuple(solid), tuple(rated))
 
 
 def _obstacle_of(scenario: Scenario, element: Element) -> Obstacles:
@@ -49,12 +56,11 @@ def _obstacle_of(scenario: Scenario, element: Element) -> Obstacles:
     return Obstacles((rectangle,)) if variant.stops_vehicles else Obstacles(solid=(rectangle,))
 
 
-_UNKNOWN: Final = 0
 _NONE: Final = 1
 
 
 class ObstacleTable:
-    """The obstacles of the numbered elements of a site, each found when it is asked for first.
+    """The obstacles of the numbered elements of a site.
 
     Args:
         scenario: The scenario.
@@ -66,20 +72,31 @@ class ObstacleTable:
     """
 
     def __init__(self, scenario: Scenario, catalogue: Catalogue) -> None:
-        self._scenario, self._catalogue = scenario, catalogue
-        self.boxes_m: FloatArray = np.zeros((catalogue.finish, 4))
-        self.kinds: NDArray[np.uint8] = np.zeros(catalogue.finish, dtype=np.uint8)
+        variants, zone = catalogue.variants, scenario.zone
+        shape = len(variants), *catalogue.shape
+        # 1. Rectangles as by `BuildZone.cells_rectangle_m`, of all cells at once.
+        row, column = (np.arange(count) * MODULE_SIDE_M for count in catalogue.shape)
+        left_m, bottom_m = zone.corner_m[0] + column, (zone.corner_m[1] + row)[:, np.newaxis]
+        boxes_m = np.empty((*shape, 4))
+        kinds = np.empty(shape, dtype=np.uint8)
+        for number, variant in enumerate(variants):
+            width_m, depth_m = variant.columns * MODULE_SIDE_M, variant.rows * MODULE_SIDE_M
+            sides_m = left_m, bottom_m, left_m + width_m, bottom_m + depth_m
+            for side, side_m in enumerate(sides_m):
+                boxes_m[number, :, :, side] = side_m
+            kinds[number] = _kind(variant)
+        self.boxes_m: FloatArray = boxes_m.reshape(-1, 4)
+        self.kinds: NDArray[np.uint8] = kinds.ravel()
+        # 2. Elements on a terrace are out of reach.
+        terraces = [structure for structure in scenario.structures if structure.carries]
+        left, bottom, right, top = self.boxes_m.T
+        self.kinds[ground_m(terraces, (left, bottom, right, top)) > 0.0] = _NONE
 
-    def learn(self, numbers: IntArray) -> None:
-        """Find the obstacles of elements."""
-        for number in np.unique(numbers[self.kinds[numbers] == _UNKNOWN]).tolist():
-            found = obstacles_of(self._scenario, (self._catalogue.element(number),))
-            kind = _NONE
-            if found.rated:
-                stops_all = found.rated[0].rating.penetration_m == 0.0
-                kind, box = (STOPS if stops_all else OTHER), found.rated[0].rectangle
-                self.boxes_m[number] = box
-            elif found.stops or found.solid:
-                kind = STOPS if found.stops else SOLID
-                self.boxes_m[number] = (*found.stops, *found.solid)[0]
-            self.kinds[number] = kind
+
+def _kind(variant: Variant) -> int:
+    """Return what the pieces of a variant are for vehicles."""
+    if variant.is_measure:
+        return _NONE
+    if variant.crash_rating is not None:
+        return STOPS if variant.crash_rating.penetration_m == 0.0 else OTHER
+    return STOPS if variant.stops_vehicles else SOLID

@@ -483,7 +483,7 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
 
 def load_relevant(layout: Iterable[Element]) -> Layout:
     """Return the elements that affect loads: all but the measures that harden facades."""
-    return tuple(element for element in layout if type(element) is not Measure)
+    return tuple([element for element in layout if type(element) is not Measure])
 
 
 def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:

@@ -3,19 +3,29 @@
 from dataclasses import dataclass
 from functools import cache
 from math import log, log10, sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from blast_env.arrays import FloatArray, IntArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
 from blast_env.curves.kingery_bulmash import CURVES_SCALED_M, curve_polynomial, kingery_bulmash
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.points import WallPoints
-from blast_env.surrogate.relations import RELATIONS, put_relations
-from blast_env.surrogate.rooms import FLOAT, Room, new_room
-from blast_env.surrogate.ways import SHARES, Ways
+from blast_env.surrogate.relations import RELATIONS, put_relations, solid_relations
+from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, Counts, Room
+from blast_env.surrogate.ways import (
+    ABOVE_M,
+    ASIDE_M,
+    FALLS_M,
+    REFERENCE_KG,
+    SHARES,
+    STATIONS,
+    Ways,
+    put_open_shares,
+    put_ways,
+)
 
 _LEAST_HEIGHT_M: Final = 0.3
 """Least height of the centre of a charge above the ground."""
@@ -32,6 +42,53 @@ FEATURES: Final = _GEOMETRY + 2 * SHARES
 
 INPUTS: Final = FEATURES + RELATIONS
 """Inputs per point, plus those per solid and point."""
+
+
+class ApproachArrays(NamedTuple):
+    """The layout-independent data of a charge and points on walls, as compiled code puts it.
+
+    Attributes:
+        by_m: See `Ways`.
+        by_height_m: See `Ways`.
+        stopped: See `Ways`.
+        is_straight_open: See `Ways`.
+        weights: See `Ways`.
+        relations: Relations of each structure to each point (structures, points, RELATIONS).
+        features: Features of each point on the empty site (points, FEATURES).
+        logs: Logarithms of the impulse, Pa s, and the peak, Pa, in the open (2, points).
+    """
+
+    by_m: FloatArray
+    by_height_m: FloatArray
+    stopped: Counts
+    is_straight_open: BoolArray
+    weights: FloatArray
+    relations: FloatArray
+    features: FloatArray
+    logs: FloatArray
+
+    @classmethod
+    def in_room(cls, points: int, structures: int, room: Room) -> "ApproachArrays":
+        """Return arrays with any content."""
+        shape = points, len(STATIONS), len(ASIDE_M)
+        left = *shape[:2], (len(ASIDE_M) + 1) // 2, len(ABOVE_M) + 1, len(FALLS_M)
+        return cls(
+            room("places", (*shape, 2), FLOAT),
+            room("heights", shape[:2], FLOAT),
+            room("stopped", shape, BYTE),
+            room("open", shape[:1], BOOL),
+            room("weights", left, FLOAT),
+            room("relations of structures", (structures, points, RELATIONS), FLOAT),
+            room("features", (points, FEATURES), FLOAT),
+            room("logs", (2, points), FLOAT),
+        )
+
+
+def charge_row(charge: Charge) -> tuple[float, float, float, float, float]:
+    """Return position, scaling length and longest decay length of a charge, m."""
+    height_m = max(charge.height_m, _LEAST_HEIGHT_M)
+    fall_m = FALLS_M[-1] * float(np.cbrt(charge.tnt_kg / REFERENCE_KG))
+    return (*charge.position_m, height_m, float(np.cbrt(charge.tnt_kg)), fall_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,50 +119,25 @@ class Approach:
     area_m2: FloatArray
 
     @classmethod
-    def between(
-        cls, charge: Charge, points: WallPoints, solids: FloatArray, room: Room = new_room
-    ) -> "Approach":
+    def between(cls, charge: Charge, points: WallPoints, solids: FloatArray) -> "Approach":
         """Return the data of a charge and the points of walls.
 
         Args:
             charge: The charge.
             points: The points.
             solids: Left, bottom, right, top and height of each structure, m (solids, 5).
-            room: Gives the arrays.
 
         Raises:
             BlastEnvError: If a point is farther away than the curves reach.
         """
-        # 1. The paths, and the relations of the structures.
-        start_m = np.array((*charge.position_m, max(charge.height_m, _LEAST_HEIGHT_M)))
-        scale_m, count = float(np.cbrt(charge.tnt_kg)), len(points.area_m2)
-        ways = Ways.between(start_m, points.points_m, charge.tnt_kg, solids, room)
-        relations = room("relations of structures", (len(solids), count, RELATIONS), FLOAT)
-        put_relations(start_m, points.points_m, points.outward, scale_m, solids, relations)
-        # 2. What each point knows of itself, and loads in the open that the networks correct.
-        features = room("features", (count, FEATURES), FLOAT)
-        logs = room("logs", (2, count), FLOAT)
-        walls = points.points_m, points.outward, points.to_roof_m, points.to_edge_m
-        farthest_m = _put_features(start_m, scale_m, *walls, *_curves(), features, logs)
-        if farthest_m > scale_m * CURVES_SCALED_M[1]:  # this has the words for it
-            kingery_bulmash("reflected_impulse", farthest_m, charge.tnt_kg)
-        shares = room("shares", (count, SHARES), FLOAT)
-        ways.put_shares(shares)
-        features[:, _GEOMETRY : FEATURES - SHARES] = features[:, FEATURES - SHARES :] = shares
-        known = features, relations, *logs, points.area_m2
+        row, count = charge_row(charge), len(points.area_m2)
+        own = ApproachArrays.in_room(count, len(solids), Room())
+        start_m, scale_m = np.array(row[:3]), row[3]
+        farthest_m = put_approach(start_m, *row[3:], points, solids, curves(), own)
+        check_within_curves(farthest_m, charge)
+        known = own.features, own.relations, *own.logs, points.area_m2
+        ways = Ways(start_m, points.points_m, *own[:5])
         return cls(points.starts, ways, points.outward, scale_m, *known)
-
-    @property
-    def log_loads(self) -> tuple[FloatArray, FloatArray]:
-        """The logarithms of impulses and of overpressures in the open."""
-        return self.log_impulse, self.log_peak
-
-    @property
-    def nbytes(self) -> int:
-        """Size in memory."""
-        ways = self.ways
-        arrays = ways.by_m, ways.stopped, ways.weights, self.on_empty, self.solids
-        return sum(array.nbytes for array in arrays)
 
     def points_of(self, structure: int) -> slice:
         """Return the slice of a structure's points, by its index among the protected ones."""
@@ -122,27 +154,80 @@ class Approach:
         features[changed, FEATURES - SHARES :] = shares
         return features
 
-    def relations(self, barrier: FloatArray, room: Room = new_room) -> FloatArray:
+    def relations(self, barrier: FloatArray) -> FloatArray:
         """Return the relations of each piece to each point (pieces, points, RELATIONS).
 
         Args:
             barrier: As for `features`.
-            room: Gives the array.
         """
-        ways, shape = self.ways, (len(barrier), len(self.area_m2), RELATIONS)
-        found: FloatArray = room("relations of pieces", shape, FLOAT)
-        put_relations(ways.start_m, ways.points_m, self.outward, self.scale_m, barrier, found)
-        return found
+        ways = self.ways
+        return solid_relations(
+            ways.start_m, ways.points_m, self.outward, self.scale_m, np.ascontiguousarray(barrier)
+        )
+
+
+def check_within_curves(farthest_m: float, charge: Charge) -> None:
+    """Refuse a charge with a point beyond the reach of the curves (`BlastEnvError`)."""
+    if farthest_m > float(np.cbrt(charge.tnt_kg)) * CURVES_SCALED_M[1]:  # this has the words for it
+        kingery_bulmash("reflected_impulse", farthest_m, charge.tnt_kg)
 
 
 @cache
-def _curves() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def curves() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the polynomials of impulses and peaks: coefficients, and a, b and ln(factor)."""
     impulse, peak = (
         curve_polynomial(quantity) for quantity in ("reflected_impulse", "reflected_overpressure")
     )
     of_both = [np.array((a, b, log(factor))) for a, b, _, factor in (impulse, peak)]
     return impulse[2], of_both[0], peak[2], of_both[1]
+
+
+@compiled(nogil=True, error_model="numpy", inline="always")
+def put_approach(
+    start_m: FloatArray,
+    scale_m: float,
+    fall_m: float,
+    points: WallPoints,
+    solids: FloatArray,
+    of_curves: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    own: ApproachArrays,
+) -> float:
+    """Put the layout-independent data of a charge; return the largest distance of a point.
+
+    Args:
+        start_m: Position of the charge (3,).
+        scale_m: Scaling length.
+        fall_m: Longest decay length of the weight of a detour.
+        points: The points.
+        solids: Left, bottom, right, top and height of each structure, m (solids, 5).
+        of_curves: What `curves` returns.
+        own: The arrays.
+    """
+    # 1. The paths, and the relations of the structures; 2. what each point knows of itself, and
+    # loads in the open that the networks correct; 3. its open shares, equal without a barrier.
+    put_ways(
+        start_m,
+        points.points_m,
+        fall_m,
+        solids,
+        own.by_m,
+        own.by_height_m,
+        own.stopped,
+        own.is_straight_open,
+        own.weights,
+    )
+    put_relations(start_m, points.points_m, points.outward, scale_m, solids, own.relations)
+    walls = points.points_m, points.outward, points.to_roof_m, points.to_edge_m
+    features = own.features
+    farthest_m: float = _put_features(start_m, scale_m, *walls, *of_curves, features, own.logs)
+    every = np.arange(len(features))
+    shares = np.empty((len(features), SHARES))
+    put_open_shares(every, own.stopped, own.is_straight_open, own.weights, shares)
+    for point in range(len(features)):
+        for share in range(SHARES):
+            features[point, _GEOMETRY + share] = shares[point, share]
+            features[point, _GEOMETRY + SHARES + share] = shares[point, share]
+    return farthest_m
 
 
 @compiled(nogil=True, error_model="numpy")

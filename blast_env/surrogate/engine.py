@@ -144,7 +144,7 @@ class SurrogateEngine(Engine):
         for number, blast in enumerate(blasts):
             of_sites.setdefault(blast.scenario.content_hash, []).append(number)
         # The first site compiles everything; to listen takes longer than a prediction.
-        compiles = compilation_notice("the surrogate (some 10 s)")
+        compiles = compilation_notice("the surrogate (some 20 s)")
         numbers_of_sites = [*of_sites.values()]
         with nullcontext() if self._sites else compiles:
             of_all = self._loads_of_sites(blasts, numbers_of_sites)

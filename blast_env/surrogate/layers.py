@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.compilation import compiled
-from blast_env.gas.simd import fill, get, lanes_at, larger, load, place, smaller, store
+from blast_env.gas.simd import fill, get, lanes_at, larger, load, own_frame, place, smaller, store
 from blast_env.gas.state import FUSED
 
 SingleArray = NDArray[np.float32]
@@ -185,6 +185,7 @@ def two_layers(
     return found[:, : rows.shape[1]]
 
 
+@njit(error_model="numpy")
 def whole(rows: int) -> int:
     """Return a number of rows, rounded up to a multiple of those that pass together."""
     return -(-rows // ROWS_AT_ONCE) * ROWS_AT_ONCE
@@ -205,6 +206,7 @@ def put_two_layers(
     Compiled code that makes an array itself frees it after its last mention, which is where its
     place in memory is asked for: `middle` has room for four rows between the layers.
     """
+    own_frame()
     members, width, outputs = second.shape
     count, inputs = rows.shape[1:]
     at, between, end = place(rows), place(middle), place(found)

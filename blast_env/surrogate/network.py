@@ -26,7 +26,8 @@ from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.layers import SingleArray, two_layers
-from blast_env.surrogate.pieces import NetworkLayers, PieceKnowledge, Scales, mean_and_spread
+from blast_env.surrogate.loads import NetworkLayers, Scales, mean_and_spread
+from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.rooms import Room
 from blast_env.surrogate.walls import SurrogateSite
@@ -38,6 +39,9 @@ _PACKAGED: Final = Path(__file__).with_name("gas.json")
 
 Asked = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
 """A site, its layouts, and the charge against each of them."""
+
+_FEW: Final = 4
+"""Most layouts against a charge for which nothing of their pieces is kept when it is met first."""
 
 HIDDEN: Final = 64
 """Width of the two hidden layers."""
@@ -270,23 +274,28 @@ class Networks:
         found: FloatArray = np.einsum("mpi,mi->mp", second, layers.last[..., 0])
         return found + layers.last_bias
 
-    def layers(self, power: float) -> NetworkLayers:
-        """Return the layers as compiled code takes them, and the power of the mean over walls."""
-        layers, sending = self._layers, len(_SENDING)
+    def layers(self, kind: int, power: float) -> NetworkLayers:
+        """Return the layers as compiled code takes them.
+
+        Args:
+            kind: 0 for networks of impulses, 1 for those of peaks.
+            power: Exponent of the mean over the walls.
+        """
+        layers, members = self._layers, len(self.members)
         constants, shares, structures, pieces = np.split(
             layers.first, (FEATURES - SHARES, FEATURES, FEATURES + MESSAGE), axis=1
         )
-        return NetworkLayers(
-            (layers[:sending], layers[sending : 2 * sending]),
+        arrays: list[Any] = [
+            *layers[: 2 * len(_SENDING)],
             np.concatenate((constants, structures), axis=1),
             layers.first_bias,
             np.concatenate((shares, pieces), axis=1),
-            layers.second,
-            layers.second_bias,
+            *(layers.second, layers.second_bias),
             np.ascontiguousarray(layers.last[..., 0]),
             np.ascontiguousarray(layers.last_bias[:, 0]),
-            power,
-        )
+            *(np.full(members, kind), np.full(members, power)),
+        ]
+        return NetworkLayers(*arrays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,18 +381,32 @@ class Surrogate:
             of_charges.setdefault(charge, []).append(number)
         # 2. What structures and pieces say to each point: sums of messages (Gilmer et al. 2017,
         # Neural message passing for quantum chemistry), as the order of solids has no meaning.
-        kinds = self._kinds[: 1 + site.counts_peaks]
-        order: list[int] = []
+        layers, parts, order = self._stacks[site.counts_peaks], list[FloatArray](), list[int]()
+        fresh: list[Charge] = []
+        boxes_of_fresh, room = [], site.memory.take_room()
         for charge, numbers in of_charges.items():
-            order += numbers
-            boxes = [site.boxes(layouts[number]) for number in numbers]
+            key, boxes = (self, site, charge), [site.boxes(layouts[number]) for number in numbers]
+            if len(numbers) <= _FEW and site.memory.is_first(key):
+                fresh.append(charge)
+                boxes_of_fresh.append(boxes)
+                continue
 
             def make(room: Room, charge: Charge = charge) -> PieceKnowledge:
-                return PieceKnowledge(site.new_approach(charge, room), self._scales, kinds, room)
+                return PieceKnowledge(charge, site.arrays, self._scales, layers, room)
 
-            with site.memory.known((self, site, charge), make) as (known, room):
-                for own, logs in zip(found, known.log_loads(boxes, room), strict=False):
-                    own.append(logs.reshape(len(logs), -1))
+            parts.append(site.memory.known(key, make, room).log_loads(boxes, room))
+            order += numbers
+        # 3. The charges that are met for the first time, all at once.
+        if fresh:
+            arrays = site.arrays, self._scales, layers
+            parts.append(log_loads_of(*arrays, fresh, boxes_of_fresh, room))
+            order += [number for charge in fresh for number in of_charges[charge]]
+        site.memory.return_room(room)
+        members = len(self.impulse.members)
+        for logs in parts:
+            found[0].append(logs[:members].reshape(members, -1))
+            if site.counts_peaks:
+                found[1].append(logs[members:].reshape(len(logs) - members, -1))
         place = np.empty(len(layouts), dtype=np.int64)
         place[order] = range(len(place))
         return place
@@ -441,9 +464,12 @@ class Surrogate:
         return path
 
     @cached_property
-    def _kinds(self) -> tuple[NetworkLayers, NetworkLayers]:
-        """The networks of impulses and of peaks, with the powers of their means over walls."""
-        return self.impulse.layers(IMPULSE_POWER), self.peak.layers(PEAK_POWER)
+    def _stacks(self) -> tuple[NetworkLayers, NetworkLayers]:
+        """The networks of impulses alone, and those of impulses and of peaks."""
+        alone = self.impulse.layers(0, IMPULSE_POWER)
+        of_peaks = self.peak.layers(1, PEAK_POWER)
+        arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(alone, of_peaks, strict=True))
+        return alone, NetworkLayers(*map(np.concatenate, arrays))
 
     @cached_property
     def _scales(self) -> Scales:

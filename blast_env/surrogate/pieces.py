@@ -1,46 +1,42 @@
 """What the surrogate knows of a charge and of the pieces of layouts, and the loads behind them.
 
-Layouts have many pieces in common, and what a piece does to a point depends on no other piece. Of
-each place in plan a piece stops the lowest paths, so that several together stop as many as the one
-that stops most. Messages add up. So each piece is computed once per charge.
+Layouts have many pieces in common, and what a piece does to a point depends on no other piece. So
+each piece is computed once per charge.
 
 Most charges and pieces of training are never met again. What is known of them is kept from the
 second time on, that of pieces from the third; before, it is in room that the next charge takes.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
-from math import exp, log, sqrt
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Hashable, Sequence
+from itertools import accumulate
+from typing import Any, Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray, FloatArray
-from blast_env.compilation import compiled
-from blast_env.gas.simd import fill, lanes_at, load, place, store
-from blast_env.gas.state import FUSED
-from blast_env.surrogate.approach import FEATURES, Approach
-from blast_env.surrogate.layers import (
-    PARTS,
-    ROWS_AT_ONCE,
-    SingleArray,
-    four_rows,
-    four_sums,
-    put_parts,
-    put_two_layers,
-    whole,
+from blast_env.arrays import FloatArray
+from blast_env.site.blast_site import Charge
+from blast_env.surrogate.approach import ApproachArrays, charge_row, check_within_curves
+from blast_env.surrogate.layers import SingleArray, whole
+from blast_env.surrogate.loads import (
+    INTEGER,
+    Asked,
+    Bench,
+    NetworkLayers,
+    Numbers,
+    Pieces,
+    Scales,
+    SiteArrays,
+    put_charge,
+    put_charges,
+    put_loads,
+    put_pieces,
 )
-from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.rooms import BOOL, BYTE, SINGLE, Counts, KeptRoom, Room, new_room
-from blast_env.surrogate.ways import ASIDE_M, FALLS_M, SHARES, STATIONS
+from blast_env.surrogate.rooms import SINGLE, KeptRoom, Room
 
 Box = tuple[float, ...]
 """Left, bottom, right, top and height of a piece, m."""
-
-Numbers = NDArray[np.int32]
 
 _MOST_BYTES: Final = 2**26
 _MOST_MET: Final = 4096
@@ -49,141 +45,138 @@ _MOST_MET: Final = 4096
 _OFTEN: Final = 2
 """Times that a piece is met without being kept."""
 
-_FALLS: Final = len(FALLS_M)
 
+def log_loads_of(
+    site: SiteArrays,
+    scales: Scales,
+    layers: NetworkLayers,
+    charges: Sequence[Charge],
+    layouts: Sequence[Sequence[Sequence[Box]]],
+    room: Room,
+) -> FloatArray:
+    """Return the logarithms of loads against charges of which nothing is known or kept.
 
-class NetworkLayers(NamedTuple):
-    """The layers of a set of networks, in single precision.
+    Args:
+        site: The site.
+        scales: The scales of inputs.
+        layers: The networks.
+        charges: The charges.
+        layouts: The pieces of each layout against each charge.
+        room: Gives arrays for a moment.
 
-    Attributes:
-        sending: Weights and biases of the two layers of messages of structures, and of pieces.
-        constant: Weights of the first layer at points, of inputs that no layout changes and of the
-            messages of structures (members, n + length, width).
-        first_bias: Its biases (members, width).
-        first: Its weights of open shares and of the messages of pieces (members, SHARES + length,
-            width).
-        second: Weights of the second layer (members, width, width).
-        second_bias: Its biases (members, width).
-        last: Weights of the last layer (members, width).
-        last_bias: Its bias (members,).
-        power: Exponent of the mean over the walls.
+    Returns:
+        Those of all layouts, in the order of the charges (members, layouts, structures).
     """
+    counts = [len(boxes) for of_charge in layouts for boxes in of_charge]
+    most = max(sum(map(len, of_charge)) for of_charge in layouts)
+    all_boxes = [box for of_charge in layouts for boxes in of_charge for box in boxes]
+    asked = Asked(
+        np.array([charge_row(charge) for charge in charges]),
+        np.array([0, *accumulate(map(len, layouts))]),
+        np.array(all_boxes, dtype=np.float64).reshape(-1, 5),
+        np.array([0, *accumulate(counts)]),
+    )
+    points, structures = len(site.points.area_m2), len(site.solids)
+    members, _, width = layers.constant.shape
+    found = np.empty((members, len(counts), len(site.points.starts)))
+    farthest_m = np.empty(len(charges))
 
-    sending: tuple[tuple[SingleArray, ...], tuple[SingleArray, ...]]
-    constant: SingleArray
-    first_bias: SingleArray
-    first: SingleArray
-    second: SingleArray
-    second_bias: SingleArray
-    last: SingleArray
-    last_bias: SingleArray
-    power: float
+    def make(room: Room) -> tuple[ApproachArrays, SingleArray, Pieces, Pieces, Bench, Numbers]:
+        return (
+            ApproachArrays.in_room(points, structures, room),
+            room("base", (members, whole(points), width), SINGLE),
+            Pieces.in_room(points, layers, Room(), 0),
+            Pieces.in_room(points, layers, room, most),
+            Bench.in_room(points, structures, layers, room, most),
+            room("numbers", (most + 1,), INTEGER),
+        )
 
-
-class Scales(NamedTuple):
-    """Mean and standard deviation of inputs, and the bound on the scaled values.
-
-    Attributes:
-        mean: Means of features, then of relations.
-        scale: Standard deviations.
-        most: The bound.
-    """
-
-    mean: FloatArray
-    scale: FloatArray
-    most: float
-
-
-class Pieces(NamedTuple):
-    """What is known of some pieces.
-
-    Attributes:
-        stopped: Number of paths that each stops by each place (pieces, points, places).
-        is_open: Whether the straight path is open (pieces, points).
-        messages: Their messages by each set of networks (members, pieces, rows, length).
-    """
-
-    stopped: Counts
-    is_open: BoolArray
-    messages: list[SingleArray]
-
-    @property
-    def nbytes(self) -> int:
-        """Size in memory."""
-        return sum(map(_nbytes, (self.stopped, self.is_open, *self.messages)))
+    arrays = room.together(("charges", points, structures, members, most), make)
+    put_charges(asked, site, scales, layers, *arrays, found, farthest_m)
+    for charge, away_m in zip(charges, farthest_m.tolist(), strict=True):
+        check_within_curves(away_m, charge)
+    return found
 
 
 class PieceKnowledge:
     """A charge, the structures of a site, and the pieces met so far.
 
     Args:
-        approach: The charge and the walls.
+        charge: The charge.
+        site: The site.
         scales: The scales of inputs.
-        networks: The sets of networks.
+        layers: The networks.
         room: Gives the arrays of the charge.
     """
 
     def __init__(
         self,
-        approach: Approach,
+        charge: Charge,
+        site: SiteArrays,
         scales: Scales,
-        networks: Sequence[NetworkLayers],
-        room: Room = new_room,
+        layers: NetworkLayers,
+        room: Room,
     ) -> None:
-        self.approach, self._scales, self._networks = approach, scales, networks
+        self._site, self._scales, self._layers = site, scales, layers
         self._numbers: dict[Box, int] = {}
         self._met: dict[Box, int] = {}
-        self._points = len(approach.area_m2)
-        self._rows = whole(self._points)
-        sent = self._sent(approach.solids, 0, room, "of structures")
-        pairs = zip(networks, sent, strict=True)
-        self._bases = [self._base(number, *pair, room) for number, pair in enumerate(pairs)]
-        self._pieces = Pieces(
-            np.empty((0, self._points, _PLACES), dtype=BYTE),
-            np.empty((0, self._points), dtype=BOOL),
-            [np.ascontiguousarray(messages[:, :0]) for messages in sent],
+        self._points, structures = len(site.points.area_m2), len(site.solids)
+        members, _, width = layers.constant.shape
+        *start_m, self._scale_m, fall_m = charge_row(charge)
+        self._start_m = np.array(start_m)
+        self._own = ApproachArrays.in_room(self._points, structures, room)
+        self._base = room("base", (members, whole(self._points), width), SINGLE)
+        bench = Bench.in_room(self._points, structures, layers, Room(), 0)
+        farthest_m = put_charge(
+            *(self._start_m, self._scale_m, fall_m, site, scales, layers),
+            *(self._own, self._base, bench),
         )
+        check_within_curves(farthest_m, charge)
+        self._pieces = Pieces.in_room(self._points, layers, Room(), 0)
+        of_piece = Pieces.in_room(self._points, layers, Room(), 1)
+        self._bytes = self._base.nbytes + sum([array.nbytes for array in self._own])
+        self._bytes_of_piece = sum([array.nbytes for array in of_piece])
 
     @property
     def nbytes(self) -> int:
         """Size in memory."""
-        used = len(self._numbers) / max(len(self._pieces.stopped), 1)
-        of_pieces = int(used * self._pieces.nbytes)
-        return self.approach.nbytes + of_pieces + sum(map(_nbytes, self._bases))
+        return self._bytes + len(self._numbers) * self._bytes_of_piece
 
-    def log_loads(self, layouts: Sequence[Sequence[Box]], room: Room) -> list[FloatArray]:
+    def log_loads(self, layouts: Sequence[Sequence[Box]], room: Room) -> FloatArray:
         """Return the logarithm of the load on each structure (members, layouts, structures).
 
         Args:
             layouts: The pieces of each layout.
             room: Gives the arrays of pieces that are not kept.
-
-        Returns:
-            One array of each set of networks.
         """
         # 1. The pieces that are not kept are computed: numbers of these are below 0.
-        numbers = self._numbers
+        numbers, site = self._numbers, self._site
         new = list(dict.fromkeys([b for boxes in layouts for b in boxes if b not in numbers]))
-        fresh = self._new(new, room)
         of_new = {box: -number for number, box in enumerate(new, start=1)}
         found: Numbers = np.zeros((len(layouts), max(map(len, layouts)) + 1), dtype=np.int32)
         for own, boxes in zip(found, layouts, strict=True):
             own[: len(boxes)] = [numbers.get(box) or of_new[box] for box in boxes]
+        sizes = self._points, len(site.solids), len(self._base), len(new)
+
+        def make(room: Room) -> tuple[Bench, Pieces]:
+            points, structures, _, pieces = sizes
+            bench = Bench.in_room(points, structures, self._layers, room, pieces)
+            return bench, Pieces.in_room(points, self._layers, room, pieces)
+
+        bench, fresh = room.together(("pieces", *sizes), make)
+        if new:
+            put_pieces(
+                *(np.array(new), self._start_m, self._scale_m, site.points, self._scales),
+                *(self._layers, self._own, bench, fresh),
+            )
         # 2. The loads, and 3. pieces met for the third time are kept.
-        loads = [self._loads(found, which, fresh, room) for which in range(len(self._networks))]
+        loads = np.empty((len(self._base), len(layouts), len(site.points.starts)))
+        put_loads(
+            *(found, site.points, self._scales, self._layers, self._own, self._base),
+            *(self._pieces, fresh, bench, 0, loads),
+        )
         self._keep(new, fresh)
         return loads
-
-    def _new(self, boxes: Sequence[Box], room: Room) -> Pieces:
-        """Return new pieces, each of which depends on no other."""
-        if not boxes:
-            return self._pieces  # no layout has a new one
-        pieces, ways = np.array(boxes), self.approach.ways
-        stopped = room("stopped by pieces", (len(boxes), *ways.stopped.shape), BYTE)
-        is_open = room("open behind pieces", (len(boxes), self._points), BOOL)
-        ways.put_stopped_by(pieces, stopped, is_open)
-        sent = self._sent(self.approach.relations(pieces, room), 1, room, "of pieces")
-        return Pieces(stopped.reshape(len(boxes), self._points, _PLACES), is_open, sent)
 
     def _keep(self, boxes: Sequence[Box], fresh: Pieces) -> None:
         """Keep those of the new pieces that have often been met."""
@@ -194,79 +187,18 @@ class PieceKnowledge:
         if not again:
             return
         first, kept = len(self._numbers), self._pieces
-        messages = [
-            _with(old, more[:, again], first, axis=1)
-            for old, more in zip(kept.messages, fresh.messages, strict=True)
-        ]
-        stopped = _with(kept.stopped, fresh.stopped[again], first)
-        self._pieces = Pieces(stopped, _with(kept.is_open, fresh.is_open[again], first), messages)
+        self._pieces = Pieces(
+            _with(kept.stopped, fresh.stopped[again], first),
+            _with(kept.is_open, fresh.is_open[again], first),
+            _with(kept.messages, fresh.messages[:, again], first, axis=1),
+        )
         for number in again:
             del met[boxes[number]]
             self._numbers[boxes[number]] = len(self._numbers) + 1
 
-    def _loads(self, layouts: Numbers, which: int, fresh: Pieces, room: Room) -> FloatArray:
-        """Return the logarithms of loads by one set of networks."""
-        approach, networks, base = self.approach, self._networks[which], self._bases[which]
-        ways, kept, (members, _, width) = approach.ways, self._pieces, base.shape
-        found = np.empty((members, len(layouts), len(approach.starts)))
-        _put_loads(
-            layouts,
-            ways.stopped.reshape(-1, _PLACES),
-            ways.is_straight_open,
-            *(kept.stopped, kept.is_open, kept.messages[which]),
-            *(fresh.stopped, fresh.is_open, fresh.messages[which]),
-            ways.weights,
-            *self._scales,
-            base,
-            *networks[3:8],
-            approach.log_loads[which],
-            approach.area_m2,
-            approach.starts,
-            networks.power,
-            room("given", (self._rows, networks.first.shape[1]), SINGLE),
-            room("between", (ROWS_AT_ONCE, width), SINGLE),
-            room("beyond", (ROWS_AT_ONCE, width), SINGLE),
-            room("parts", (ROWS_AT_ONCE, PARTS), SINGLE),
-            found,
-        )
-        return found
-
-    def _sent(self, relations: FloatArray, which: int, room: Room, name: str) -> list[SingleArray]:
-        """Return the messages of solids by each set of networks (members, solids, rows, length)."""
-        solids = len(relations)
-        rows = room("related", (1, solids * self._rows, RELATIONS), SINGLE)
-        _put_related(relations, *self._scales, rows.reshape(solids, self._rows, RELATIONS))
-        found = []
-        for number, networks in enumerate(self._networks):
-            sending = networks.sending[which]
-            second = sending[2]
-            shape = len(second), solids * self._rows, second.shape[2]
-            sent = room(f"messages {number} {name}", shape, SINGLE)
-            middle = room("middle", (ROWS_AT_ONCE, second.shape[1]), SINGLE)
-            put_two_layers(rows, *sending, middle, sent)
-            found.append(sent.reshape(len(second), solids, self._rows, -1))
-        return found
-
-    def _base(
-        self, number: int, networks: NetworkLayers, messages: SingleArray, room: Room
-    ) -> SingleArray:
-        """Return the sums of the first layer over what no layout changes (members, rows, width)."""
-        members, inputs, width = networks.constant.shape
-        base: SingleArray = room(f"base {number}", (members, self._rows, width), SINGLE)
-        given = room("constants", (self._rows, inputs), SINGLE)
-        layers = networks.constant, networks.first_bias
-        _put_base(self.approach.on_empty, *self._scales, messages, *layers, given, base)
-        return base
-
-
-def _nbytes(array: NDArray[Any]) -> int:
-    return array.nbytes
-
 
 _LEAST_ROOM: Final = 32
 """Pieces of a charge for which there is room at first."""
-
-_PLACES: Final = len(STATIONS) * len(ASIDE_M)
 
 
 def _with(kept: NDArray[Any], more: NDArray[Any], first: int, axis: int = 0) -> NDArray[Any]:
@@ -280,244 +212,6 @@ def _with(kept: NDArray[Any], more: NDArray[Any], first: int, axis: int = 0) -> 
         kept = grown
     kept[(*before, slice(first, after))] = more
     return kept
-
-
-@compiled(nogil=True, error_model="numpy")
-def _put_related(relations: Any, mean: Any, scale: Any, most: Any, rows: Any) -> None:
-    """Put scaled and bounded relations in rows, the last point again in rows beyond the points."""
-    solids, points, inputs = relations.shape
-    for solid in range(solids):
-        for row in range(rows.shape[1]):
-            for index in range(inputs):
-                value = relations[solid, min(row, points - 1), index]
-                scaled = (value - mean[FEATURES + index]) / scale[FEATURES + index]
-                rows[solid, row, index] = min(max(scaled, -most), most)
-
-
-@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
-def _put_base(
-    features: Any,
-    mean: Any,
-    scale: Any,
-    most: Any,
-    messages: Any,
-    weights: Any,
-    bias: Any,
-    given: Any,
-    base: Any,
-) -> None:
-    """Put the sums of the first layer; see `PieceKnowledge`."""
-    members, rows, width = base.shape
-    solids, length = messages.shape[1], messages.shape[3]
-    constant, points, inputs = FEATURES - SHARES, len(features), given.shape[1]
-    # The first layer is linear before its bend, so that the sums over inputs that no layout changes
-    # are made once: W [c, s, m] = W_c c + W_s s + W_m m.
-    to, at, said = place(base), place(given), place(messages)
-    lanes, same = lanes_at(to), (0, 0, 0, 0)
-    for row in range(rows):
-        for index in range(constant):
-            value = features[min(row, points - 1), index]
-            scaled = (value - mean[index]) / scale[index]
-            given[row, index] = min(max(scaled, -most), most)
-    for member in range(members):
-        for row in range(rows):
-            for index in range(0, length, lanes):
-                heard = fill(at, np.float32(0.0))
-                for solid in range(solids):
-                    entry = ((member * solids + solid) * rows + row) * length
-                    heard = heard + load(said, entry + index)
-                store(at, row * inputs + constant + index, heard)
-        weight, biases = place(weights[member]), place(bias[member])
-        for row in range(0, rows, ROWS_AT_ONCE):
-            end = (member * rows + row) * width
-            four_sums(at, row * inputs, inputs, weight, width, biases, same, to, end)
-
-
-@njit(error_model="numpy")
-def _put_shares(
-    own: Any,
-    stopped_before: Any,
-    is_open_before: Any,
-    stopped: Any,
-    is_open: Any,
-    new_stopped: Any,
-    new_is_open: Any,
-    weights: Any,
-    mean: Any,
-    scale: Any,
-    most: Any,
-    given: Any,
-) -> None:
-    """Put the scaled open shares of each row behind the pieces of a layout, before its messages."""
-    points, rows = len(stopped_before), len(given)
-    asides = _PLACES // len(STATIONS)
-    below = np.empty(_PLACES, dtype=np.uint8)
-    shares = np.empty(SHARES)
-    for point in range(points):
-        straight = is_open_before[point]
-        for by in range(_PLACES):
-            below[by] = stopped_before[point, by]
-        # 1. Several pieces stop as many detours by a place as the one that stops most.
-        for piece in own:
-            if piece == 0:
-                break
-            if piece > 0:
-                straight = straight and is_open[piece - 1, point]
-                for by in range(_PLACES):
-                    below[by] = max(below[by], stopped[piece - 1, point, by])
-            else:
-                straight = straight and new_is_open[-piece - 1, point]
-                for by in range(_PLACES):
-                    below[by] = max(below[by], new_stopped[-piece - 1, point, by])
-        # 2. The shares that are left, and 3. their scaled and bounded values.
-        shares[:] = 0.0
-        shares[-1] = 1.0 if straight else 0.0
-        for station in range(len(STATIONS)):
-            for aside in range(asides):
-                left = weights[point, station, (aside + 1) // 2, below[station * asides + aside]]
-                for fall in range(_FALLS):
-                    shares[station * _FALLS + fall] += left[fall]
-        for share in range(SHARES):
-            index = FEATURES - SHARES + share
-            scaled = (shares[share] - mean[index]) / scale[index]
-            given[point, share] = min(max(scaled, -most), most)
-    for row in range(points, rows):
-        for share in range(SHARES):
-            given[row, share] = given[points - 1, share]
-
-
-@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
-def _put_loads(
-    layouts: Any,
-    stopped_before: Any,
-    is_open_before: Any,
-    stopped: Any,
-    is_open: Any,
-    messages: Any,
-    new_stopped: Any,
-    new_is_open: Any,
-    new_messages: Any,
-    weights: Any,
-    mean: Any,
-    scale: Any,
-    most: Any,
-    base: Any,
-    first: Any,
-    second: Any,
-    second_bias: Any,
-    last: Any,
-    last_bias: Any,
-    known: Any,
-    area_m2: Any,
-    starts: Any,
-    power: Any,
-    given: Any,
-    between: Any,
-    beyond: Any,
-    parts: Any,
-    found: Any,
-) -> None:
-    """Put the logarithms of loads; see `PieceKnowledge.log_loads`.
-
-    Pieces are numbered from 1 if they are kept, and from -1 down if they are new; 0 ends a layout.
-    """
-    members, rows, width = base.shape
-    kept, new, length = messages.shape[1], new_messages.shape[1], messages.shape[3]
-    points, inputs = len(known), first.shape[1]
-    at, to, beside = place(given), place(between), place(beyond)
-    said, now_said, sums = place(messages), place(new_messages), place(parts)
-    lanes, same = lanes_at(at), (0, 0, 0, 0)
-    loads = np.empty(len(starts))
-    areas_m2 = np.zeros(len(starts))
-    for structure in range(len(starts)):
-        after = starts[structure + 1] if structure + 1 < len(starts) else points
-        for point in range(starts[structure], after):
-            areas_m2[structure] += area_m2[point]
-    for layout in range(len(layouts)):
-        own = layouts[layout]
-        before, then = (stopped_before, is_open_before), (stopped, is_open)
-        now = new_stopped, new_is_open
-        _put_shares(own, *before, *then, *now, weights, mean, scale, most, given)
-        for member in range(members):
-            bases, to_first = place(base[member]), place(first[member])
-            to_second, bias = place(second[member]), place(second_bias[member])
-            to_last = place(last[member])
-            loads[:] = 0.0
-            structure = 0
-            for row in range(0, rows, ROWS_AT_ONCE):
-                # 1. What the pieces say, added up.
-                for number in range(row, row + ROWS_AT_ONCE):
-                    for index in range(0, length, 2 * lanes):
-                        low = high = fill(at, np.float32(0.0))
-                        for piece in own:
-                            if piece == 0:
-                                break
-                            if piece > 0:
-                                entry = ((member * kept + piece - 1) * rows + number) * length
-                                low = low + load(said, entry + index)
-                                high = high + load(said, entry + index + lanes)
-                            else:
-                                entry = ((member * new - piece - 1) * rows + number) * length
-                                low = low + load(now_said, entry + index)
-                                high = high + load(now_said, entry + index + lanes)
-                        store(at, number * inputs + SHARES + index, low)
-                        store(at, number * inputs + SHARES + index + lanes, high)
-                # 2. Four points through the layers, from memory read once.
-                bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
-                four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)
-                four_rows(to, 0, width, to_second, width, bias, same, beside, 0)
-                # 3. L = (sum of A L_i^p / sum of A)^(1 / p): p = 1 is the mean, a large p nearly
-                # the largest.
-                put_parts(beside, width, to_last, sums)
-                for number in range(min(ROWS_AT_ONCE, points - row)):
-                    differs = np.float32(0.0)
-                    for part in range(PARTS):
-                        differs += parts[number, part]
-                    point = row + number
-                    while structure + 1 < len(starts) and point >= starts[structure + 1]:
-                        structure += 1
-                    of_point = known[point] + (differs + last_bias[member])
-                    loads[structure] += area_m2[point] * exp(power * of_point)
-            for structure in range(len(starts)):
-                of_structure = log(loads[structure] / areas_m2[structure]) / power
-                found[member, layout, structure] = of_structure
-
-
-def mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,).
-
-    Args:
-        logs: Logarithms of loads by each network (members, n); see `network.agreed`.
-    """
-    mean, spread = np.empty((2, logs.shape[1]))
-    _put_mean_and_spread(logs, np.empty(len(logs)), mean, spread)
-    return mean, spread
-
-
-@compiled(nogil=True, error_model="numpy")
-def _put_mean_and_spread(logs: Any, own: Any, mean: Any, spread: Any) -> None:
-    members, loads = logs.shape
-    cut = 1 if members > 2 else 0
-    for number in range(loads):
-        # 1. In rising order, by insertion; 2. the mean without the highest and the lowest.
-        total = 0.0
-        for member in range(members):
-            value, at = logs[member, number], member
-            total += value
-            while at and own[at - 1] > value:
-                own[at] = own[at - 1]
-                at -= 1
-            own[at] = value
-        middle = 0.0
-        for member in range(cut, members - cut):
-            middle += own[member]
-        mean[number] = exp(middle / (members - 2 * cut))
-        # 3. The standard deviation of all.
-        total /= members
-        squares = 0.0
-        for member in range(members):
-            squares += (own[member] - total) ** 2
-        spread[number] = sqrt(squares / members)
 
 
 class Memory:
@@ -534,32 +228,41 @@ class Memory:
         """Pickle nothing."""
         return Memory, ()
 
-    @contextmanager
     def known(
-        self, key: Hashable, make: Callable[[Room], PieceKnowledge]
-    ) -> Iterator[tuple[PieceKnowledge, Room]]:
-        """Give what is known of a charge, and room for a moment, for as long as the block lasts.
+        self, key: Hashable, make: Callable[[Room], PieceKnowledge], room: Room
+    ) -> PieceKnowledge:
+        """Return what is known of a charge.
 
         Args:
             key: The key of the charge.
             make: Makes what is known without any piece, with the room for it.
+            room: Room for a charge that is met for the first time.
         """
-        room = self._spare.pop() if self._spare else KeptRoom()  # each thread has its own
-        if key in self._met or key in self._kept:
-            yield self._again(key, make), room
-        else:
-            self._met[key] = None
-            if len(self._met) > _MOST_MET:
-                self._met.popitem(last=False)
-            yield make(room), room
+        return make(room) if self.is_first(key) else self._again(key, make)
+
+    def take_room(self) -> KeptRoom:
+        """Return room for a moment; each thread has its own until `return_room`."""
+        return self._spare.pop() if self._spare else KeptRoom()
+
+    def return_room(self, room: KeptRoom) -> None:
+        """Keep the room for the next one who asks, up to a size."""
         if room.nbytes <= _MOST_BYTES:
             self._spare.append(room)
+
+    def is_first(self, key: Hashable) -> bool:
+        """Return whether a charge is met for the first time, and note it."""
+        if key in self._met or key in self._kept:
+            return False
+        self._met[key] = None
+        if len(self._met) > _MOST_MET:
+            self._met.popitem(last=False)
+        return True
 
     def _again(self, key: Hashable, make: Callable[[Room], PieceKnowledge]) -> PieceKnowledge:
         """Return what is kept of a charge."""
         known = self._kept.get(key)
         if known is None:
-            known = self._kept[key] = make(new_room)
+            known = self._kept[key] = make(Room())
             self._met.pop(key, None)
         self._kept.move_to_end(key)
         # Pieces that it has come to know since are counted now.

@@ -1,8 +1,7 @@
 """Points that represent the protected walls of a site."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,8 +25,7 @@ _BEFORE_M: Final = 0.05
 """Distance of points in front of their wall, so that the wall does not obstruct their paths."""
 
 
-@dataclass(frozen=True, eq=False)
-class WallPoints:
+class WallPoints(NamedTuple):
     """Points that represent the protected walls.
 
     Attributes:

@@ -3,39 +3,47 @@
 The pages of new memory take longer than what is written to them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from math import prod
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Counts = NDArray[np.uint8]
+Made = TypeVar("Made")
 
 FLOAT: Final = np.dtype(np.float64)
 SINGLE: Final = np.dtype(np.float32)
 BYTE: Final = np.dtype(np.uint8)
 BOOL: Final = np.dtype(np.bool_)
 
-Room = Callable[[str, tuple[int, ...], np.dtype[Any]], NDArray[Any]]
-"""Returns an array of a name, shape and type, with any content."""
+_MOST_SETS: Final = 1024
 
 
-def new_room(_name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return a new array."""
-    return np.empty(shape, dtype)
+class Room:
+    """Gives new arrays, with any content."""
+
+    def __call__(self, _name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Return an array of a name, shape and type."""
+        return np.empty(shape, dtype)
+
+    def together(self, _key: Hashable, make: Callable[["Room"], Made]) -> Made:
+        """Return a set of arrays from this room; the key has its kind and all sizes."""
+        return make(self)
 
 
-class KeptRoom:
+class KeptRoom(Room):
     """Gives arrays of its own, one of each name: a name asked for again takes the earlier one."""
 
     def __init__(self) -> None:
         self._kept: dict[str, NDArray[Any]] = {}
+        self._sets: dict[Hashable, Any] = {}
 
     @property
     def nbytes(self) -> int:
         """Size in memory."""
-        return sum(array.nbytes for array in self._kept.values())
+        return sum([array.nbytes for array in self._kept.values()])
 
     def __call__(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return an array of a name, shape and type, with any content."""
@@ -43,4 +51,15 @@ class KeptRoom:
         kept = self._kept.get(name)
         if kept is None or kept.size < size:
             kept = self._kept[name] = np.empty(size, dtype)
+            self._sets.clear()  # they have the smaller one
         return kept[:size].reshape(shape)
+
+    def together(self, key: Hashable, make: Callable[[Room], Made]) -> Made:
+        """Return the same set for the same key: to shape arrays takes longer than to find it."""
+        found: Made | None = self._sets.get(key)
+        if found is None:
+            found = make(self)
+            if len(self._sets) >= _MOST_SETS:
+                self._sets.clear()
+            self._sets[key] = found
+        return found

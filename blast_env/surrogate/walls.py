@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -16,10 +17,10 @@ from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.facade import BayComponents
 from blast_env.site.terraces import ground_below_m, is_open_below
-from blast_env.surrogate.approach import Approach
+from blast_env.surrogate.approach import Approach, curves
+from blast_env.surrogate.loads import SiteArrays
 from blast_env.surrogate.pieces import Box, Memory
 from blast_env.surrogate.points import WallPoints
-from blast_env.surrogate.rooms import Room, new_room
 
 _MOST_APPROACHES: Final = 16
 """Number of charges of a site kept for a fit, each of up to two megabytes."""
@@ -73,18 +74,19 @@ class SurrogateSite:
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
         self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
 
+    @cached_property
+    def arrays(self) -> SiteArrays:
+        """The site as compiled code takes it."""
+        return SiteArrays(self._points, self._solids, curves())
+
     def approach(self, charge: Charge) -> Approach:
         """Return the layout-independent data of a charge and the protected structures."""
         if charge not in self._approaches:
-            self._approaches[charge] = self.new_approach(charge)
+            self._approaches[charge] = Approach.between(charge, self._points, self._solids)
             if len(self._approaches) > _MOST_APPROACHES:
                 self._approaches.popitem(last=False)
         self._approaches.move_to_end(charge)
         return self._approaches[charge]
-
-    def new_approach(self, charge: Charge, room: Room = new_room) -> Approach:
-        """Return the same, made anew in some room."""
-        return Approach.between(charge, self._points, self._solids, room)
 
     def bay_damages(
         self, structure: str, peak_pa: float, impulse_pa_s: float

@@ -12,7 +12,7 @@ a wall.
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
-from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, Counts, Room, new_room
+from blast_env.surrogate.rooms import BOOL, BYTE, Counts
 
 STATIONS: Final = (0.2, 0.5, 0.8)
 """Positions of the detours along the straight path, as shares of its length."""
@@ -35,10 +35,17 @@ FALLS_M: Final = (0.1, 0.3, 1.0, 3.0)
 SHARES: Final = len(STATIONS) * len(FALLS_M) + 1
 """Number of open shares per point: the last is 1 if the straight path is open, otherwise 0."""
 
-_REFERENCE_KG: Final = 100.0
+REFERENCE_KG: Final = 100.0
 
 _NO_WAY_M: Final = 1e-12
 """Shorter ways along an axis are none."""
+
+_DOUBT_M: Final = 1e-6
+"""Tolerance of the bounds on what a solid may stop, far above rounding: the paths decide."""
+
+_FROM_LEFT: Final = np.argsort(ASIDE_M)
+_ASIDE_M: Final = np.sort(ASIDE_M)
+"""Numbers and offsets of the places aside, in the order of their offsets."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +80,6 @@ class Ways:
         points_m: FloatArray,
         tnt_kg: float,
         solids: FloatArray,
-        room: Room = new_room,
     ) -> "Ways":
         """Return the paths from a charge to points.
 
@@ -82,25 +88,19 @@ class Ways:
             points_m: The points (points, 3), none above or below the charge.
             tnt_kg: Mass of the charge.
             solids: Left, bottom, right, top, height of each structure, m (solids, 5).
-            room: Gives the arrays.
         """
         points_m = np.ascontiguousarray(points_m)  # one kind of arrays is compiled once
         shape = len(points_m), len(STATIONS), len(ASIDE_M)
-        by_m, by_height_m = room("places", (*shape, 2), FLOAT), room("heights", shape[:2], FLOAT)
-        stopped, is_straight_open = room("stopped", shape, BYTE), room("open", shape[:1], BOOL)
+        by_m, by_height_m = np.empty((*shape, 2)), np.empty(shape[:2])
+        stopped, is_straight_open = np.empty(shape, dtype=BYTE), np.empty(shape[:1], dtype=BOOL)
         lefts = *shape[:2], (len(ASIDE_M) + 1) // 2, len(ABOVE_M) + 1, len(FALLS_M)
-        weights = room("weights", lefts, FLOAT)
-        # 1. Places beside and above the straight path, at some stations of it.
-        _put_places(start_m, points_m, by_m, by_height_m)
-        # 2. The weight of each detour falls with its extra length, in units that grow with the
-        # charge (Hopkinson and Cranz).
-        fall_m = FALLS_M[-1] * float(np.cbrt(tnt_kg / _REFERENCE_KG))
-        _put_weights(start_m, points_m, by_height_m, fall_m, weights)
-        # 3. The detours that the structures stop, from the lowest up.
-        stopped[:], is_straight_open[:] = 0, True
-        ways = cls(start_m, points_m, by_m, by_height_m, stopped, is_straight_open, weights)
-        ways._stop(solids, stopped, is_straight_open)
-        return ways
+        weights = np.empty(lefts)
+        # The weight of a detour falls with its extra length, in units that grow with the charge
+        # (Hopkinson and Cranz).
+        fall_m = FALLS_M[-1] * float(np.cbrt(tnt_kg / REFERENCE_KG))
+        arrays = by_m, by_height_m, stopped, is_straight_open, weights
+        put_ways(start_m, points_m, fall_m, solids, *arrays)
+        return cls(start_m, points_m, *arrays)
 
     def shares(self, barrier: FloatArray | None = None) -> FloatArray:
         """Return the shares of open paths to each point (points, SHARES), from 0 to 1.
@@ -127,7 +127,7 @@ class Ways:
         is_behind = self._stop(barrier, stopped, is_straight_open)
         behind: IntArray = np.flatnonzero(is_behind)
         shares = np.empty((len(behind), SHARES))
-        _put_open_shares(behind, stopped, is_straight_open, self.weights, shares)
+        put_open_shares(behind, stopped, is_straight_open, self.weights, shares)
         return behind, shares
 
     def stopped_by(self, solids: FloatArray) -> tuple[Counts, BoolArray]:
@@ -143,22 +143,16 @@ class Ways:
         """
         stopped = np.empty((len(solids), *self.stopped.shape), dtype=BYTE)
         is_straight_open = np.empty((len(solids), len(self.points_m)), dtype=BOOL)
-        self.put_stopped_by(solids, stopped, is_straight_open)
+        put_stopped_by(
+            *(self.start_m, self.points_m, self.by_m, self.by_height_m, solids),
+            *(self.stopped, self.is_straight_open, stopped, is_straight_open),
+        )
         return stopped, is_straight_open
-
-    def put_stopped_by(
-        self, solids: FloatArray, stopped: Counts, is_straight_open: BoolArray
-    ) -> None:
-        """Put what `stopped_by` returns into arrays."""
-        stopped[:], is_straight_open[:] = self.stopped, self.is_straight_open
-        is_behind = np.zeros(len(self.points_m), dtype=BOOL)
-        by = self.by_m, self.by_height_m
-        _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open, is_behind)
 
     def put_shares(self, shares: FloatArray) -> None:
         """Put what `shares` returns without a barrier into an array."""
         every = np.arange(len(self.points_m))
-        _put_open_shares(every, self.stopped, self.is_straight_open, self.weights, shares)
+        put_open_shares(every, self.stopped, self.is_straight_open, self.weights, shares)
 
     def _stop(self, solids: FloatArray, stopped: Counts, is_straight_open: BoolArray) -> BoolArray:
         """Mark the further paths that solids block; return the mask of their points (points,)."""
@@ -169,6 +163,56 @@ class Ways:
         )
         _stop(self.start_m, self.points_m, *by, solids, *of_all, is_behind)
         return is_behind
+
+
+@compiled(nogil=True, error_model="numpy", inline="always")
+def put_ways(
+    start_m: FloatArray,
+    points_m: FloatArray,
+    fall_m: float,
+    solids: FloatArray,
+    by_m: FloatArray,
+    by_height_m: FloatArray,
+    stopped: Counts,
+    is_straight_open: BoolArray,
+    weights: FloatArray,
+) -> None:
+    """Put the attributes of `Ways`, where `fall_m` is the longest decay length."""
+    # 1. Places beside and above the straight path, at some stations of it; 2. the weights of the
+    # detours; 3. those that the structures stop, from the lowest up.
+    _put_places(start_m, points_m, by_m, by_height_m)
+    _put_weights(start_m, points_m, by_height_m, fall_m, weights)
+    of_all = stopped.reshape((1, *stopped.shape)), is_straight_open.reshape((1, len(points_m)))
+    for point in range(len(points_m)):
+        is_straight_open[point] = True
+        for station in range(stopped.shape[1]):
+            for aside in range(stopped.shape[2]):
+                stopped[point, station, aside] = 0
+    is_behind = np.empty(len(points_m), dtype=np.bool_)
+    _stop(start_m, points_m, by_m, by_height_m, solids, *of_all, is_behind)
+
+
+@compiled(nogil=True, error_model="numpy", inline="always")
+def put_stopped_by(
+    start_m: FloatArray,
+    points_m: FloatArray,
+    by_m: FloatArray,
+    by_height_m: FloatArray,
+    solids: FloatArray,
+    stopped: Counts,
+    is_straight_open: BoolArray,
+    found: Counts,
+    is_open: BoolArray,
+) -> None:
+    """Put what `Ways.stopped_by` returns into `found` and `is_open`."""
+    for solid in range(len(solids)):  # slices would compile NumPy's messages too
+        for point in range(len(points_m)):
+            is_open[solid, point] = is_straight_open[point]
+            for station in range(stopped.shape[1]):
+                for aside in range(stopped.shape[2]):
+                    found[solid, point, station, aside] = stopped[point, station, aside]
+    is_behind = np.empty(len(points_m), dtype=np.bool_)
+    _stop(start_m, points_m, by_m, by_height_m, solids, found, is_open, is_behind)
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -314,7 +358,7 @@ def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _put_open_shares(
+def put_open_shares(
     chosen: IntArray,
     stopped: Counts,
     is_straight_open: BoolArray,
@@ -370,47 +414,97 @@ def _stop(
         while last < len(points_m) and _flat_m2(points_m[first], points_m[last]) == 0.0:
             last += 1
         end_x_m, end_y_m = points_m[first, 0], points_m[first, 1]
-        # 2. The straight path of each of them.
+        way_m = sqrt((end_x_m - start_x_m) ** 2 + (end_y_m - start_y_m) ** 2)
         for solid in range(len(solids)):
+            # 2. No path goes back or beyond the point; the straight one of each of the points.
+            near_m, far_m, low, high, low_back, high_back = _span(
+                start_x_m, start_y_m, end_x_m, end_y_m, way_m, solids, solid
+            )
+            if far_m < -_DOUBT_M or near_m > way_m + _DOUBT_M:
+                continue
+            number, height_m = min(solid, len(stopped) - 1), solids[solid, 4]
             enter, leave = _cut(start_x_m, start_y_m, end_x_m, end_y_m, solids, solid)
-            number = min(solid, len(stopped) - 1)
-            for point in range(first, last):
+            for point in range(first, last if enter < leave else first):
                 rise_m, is_open = points_m[point, 2] - start_z_m, is_straight_open[number, point]
-                if (
-                    enter < leave
-                    and is_open
-                    and _lowest_m(start_z_m, rise_m, enter, leave) < solids[solid, 4]
-                ):
+                if is_open and _lowest_m(start_z_m, rise_m, enter, leave) < height_m:
                     is_straight_open[number, point] = False
                     is_behind[point] = True
-        # 3. The detours: to a place beside the path, then on to the point. A higher one clears
-        # whatever a lower one does, so that the count of stopped ones only grows.
-        for station in range(by_m.shape[1]):
-            for aside in range(by_m.shape[2]):
-                x_m, y_m = by_m[first, station, aside, 0], by_m[first, station, aside, 1]
-                for solid in range(len(solids)):
-                    enter, leave = _cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
-                    enters, leaves = _cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
-                    if enter >= leave and enters >= leaves:
+            # 3. The detours: to a place beside the path, then on to the point. A higher one clears
+            # whatever a lower one does, so that the count of stopped ones only grows.
+            for station in range(by_m.shape[1]):
+                to_m = STATIONS[station] * way_m
+                may_there, may_on = near_m < to_m + _DOUBT_M, far_m > to_m - _DOUBT_M
+                least_m, most_m = inf, -inf
+                if may_there:
+                    least_m, most_m = low * to_m, high * to_m
+                if may_on:
+                    least_m = min(least_m, low_back * (way_m - to_m))
+                    most_m = max(most_m, high_back * (way_m - to_m))
+                for place in range(len(_ASIDE_M)):
+                    if _ASIDE_M[place] < least_m - _DOUBT_M:
                         continue
-                    number, height_m = min(solid, len(stopped) - 1), solids[solid, 4]
+                    if _ASIDE_M[place] > most_m + _DOUBT_M:
+                        break
+                    aside = _FROM_LEFT[place]
+                    x_m, y_m = by_m[first, station, aside, 0], by_m[first, station, aside, 1]
+                    enter, leave, enters, leaves = 1.0, 0.0, 1.0, 0.0
+                    if may_there:
+                        enter, leave = _cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
+                    if may_on:
+                        enters, leaves = _cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
+                    clears, clears_on = enter >= leave, enters >= leaves
+                    if clears and clears_on:
+                        continue
                     for point in range(first, last):
-                        above = stopped[number, point, station, aside]
+                        above = before = stopped[number, point, station, aside]
+                        low_m, end_z_m = by_height_m[point, station], points_m[point, 2]
                         while above < len(ABOVE_M):
-                            z_m = by_height_m[point, station] + ABOVE_M[above]
-                            to_m, on_m = z_m - start_z_m, points_m[point, 2] - z_m
-                            clears = enter >= leave or (
-                                _lowest_m(start_z_m, to_m, enter, leave) >= height_m
-                            )
-                            if clears and (
-                                enters >= leaves or _lowest_m(z_m, on_m, enters, leaves) >= height_m
-                            ):
+                            z_m = low_m + ABOVE_M[above]
+                            rise_m, on_m = z_m - start_z_m, end_z_m - z_m
+                            if (
+                                clears or _lowest_m(start_z_m, rise_m, enter, leave) >= height_m
+                            ) and (clears_on or _lowest_m(z_m, on_m, enters, leaves) >= height_m):
                                 break
                             above += 1
-                        if above > stopped[number, point, station, aside]:
+                        if above > before:
                             stopped[number, point, station, aside] = above
                             is_behind[point] = True
         first = last
+
+
+@njit(error_model="numpy")
+def _span(
+    start_x_m: float,
+    start_y_m: float,
+    end_x_m: float,
+    end_y_m: float,
+    way_m: float,
+    solids: FloatArray,
+    solid: int,
+) -> tuple[float, float, float, float, float, float]:
+    """Return where a solid is along the straight path, and how far aside as seen from its ends.
+
+    Returns:
+        Least and largest distance ahead of the charge, least and largest slope from the charge,
+        and from the point.
+    """
+    ahead_x, ahead_y = (end_x_m - start_x_m) / way_m, (end_y_m - start_y_m) / way_m
+    near_m, far_m = inf, -inf
+    low, high, low_back, high_back = inf, -inf, inf, -inf
+    for side_x in (0, 2):
+        for side_y in (1, 3):
+            x_m, y_m = solids[solid, side_x] - start_x_m, solids[solid, side_y] - start_y_m
+            ahead_m, aside_m = x_m * ahead_x + y_m * ahead_y, y_m * ahead_x - x_m * ahead_y
+            slope, slope_back = aside_m / ahead_m, aside_m / (way_m - ahead_m)
+            near_m, far_m = min(near_m, ahead_m), max(far_m, ahead_m)
+            low, high = min(low, slope), max(high, slope)
+            low_back, high_back = min(low_back, slope_back), max(high_back, slope_back)
+    # Slopes of a solid beside or around an end are unbounded.
+    if near_m < _DOUBT_M:
+        low, high = -inf, inf
+    if far_m > way_m - _DOUBT_M:
+        low_back, high_back = -inf, inf
+    return near_m, far_m, low, high, low_back, high_back
 
 
 @njit(error_model="numpy")

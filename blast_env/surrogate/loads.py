@@ -1,0 +1,572 @@
+"""Loads of layouts by the surrogate's networks, in compiled code.
+
+What a piece does to a point depends on no other piece. Of each place in plan a piece stops the
+lowest paths, so that several together stop as many as the one that stops most. Messages add up.
+
+Networks of impulses and of peaks pass one after the other as members of one stack.
+"""
+
+from math import exp, log, sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.compilation import compiled
+from blast_env.gas.simd import fill, lanes_at, load, own_frame, place, store
+from blast_env.gas.state import FUSED
+from blast_env.surrogate.approach import FEATURES, ApproachArrays, put_approach
+from blast_env.surrogate.layers import (
+    PARTS,
+    ROWS_AT_ONCE,
+    SingleArray,
+    four_rows,
+    four_sums,
+    put_parts,
+    put_two_layers,
+    whole,
+)
+from blast_env.surrogate.points import WallPoints
+from blast_env.surrogate.relations import RELATIONS, put_relations
+from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, SINGLE, Counts, Room
+from blast_env.surrogate.ways import ASIDE_M, FALLS_M, SHARES, STATIONS, put_stopped_by
+
+Numbers = NDArray[np.int32]
+
+INTEGER: Final = np.dtype(np.int32)
+
+_FALLS: Final = len(FALLS_M)
+_ASIDES: Final = len(ASIDE_M)
+_PLACES: Final = len(STATIONS) * _ASIDES
+
+
+class NetworkLayers(NamedTuple):
+    """The layers of a stack of networks, in single precision.
+
+    Attributes:
+        send: Weights of the first layer of messages of structures (members, RELATIONS, length).
+        send_bias: Its biases (members, length).
+        message: Weights of the second layer of these messages (members, length, length).
+        message_bias: Its biases (members, length).
+        piece_send: The same for messages of pieces.
+        piece_send_bias: The same.
+        piece_message: The same.
+        piece_message_bias: The same.
+        constant: Weights of the first layer at points, of inputs that no layout changes and of the
+            messages of structures (members, n + length, width).
+        first_bias: Its biases (members, width).
+        first: Its weights of open shares and of the messages of pieces (members, SHARES + length,
+            width).
+        second: Weights of the second layer (members, width, width).
+        second_bias: Its biases (members, width).
+        last: Weights of the last layer (members, width).
+        last_bias: Its bias (members,).
+        kinds: 0 for a network of impulses, 1 for one of peaks (members,).
+        powers: Exponents of the means over the walls (members,).
+    """
+
+    send: SingleArray
+    send_bias: SingleArray
+    message: SingleArray
+    message_bias: SingleArray
+    piece_send: SingleArray
+    piece_send_bias: SingleArray
+    piece_message: SingleArray
+    piece_message_bias: SingleArray
+    constant: SingleArray
+    first_bias: SingleArray
+    first: SingleArray
+    second: SingleArray
+    second_bias: SingleArray
+    last: SingleArray
+    last_bias: SingleArray
+    kinds: IntArray
+    powers: FloatArray
+
+
+class Scales(NamedTuple):
+    """Mean and standard deviation of inputs, and the bound on the scaled values.
+
+    Attributes:
+        mean: Means of features, then of relations.
+        scale: Standard deviations.
+        most: The bound.
+    """
+
+    mean: FloatArray
+    scale: FloatArray
+    most: float
+
+
+class Pieces(NamedTuple):
+    """What is known of some pieces.
+
+    Attributes:
+        stopped: Number of paths that each stops (pieces, points, stations, asides).
+        is_open: Whether the straight path is open (pieces, points).
+        messages: Their messages (members, pieces, rows, length).
+    """
+
+    stopped: Counts
+    is_open: BoolArray
+    messages: SingleArray
+
+    @classmethod
+    def in_room(cls, points: int, layers: NetworkLayers, room: Room, pieces: int) -> "Pieces":
+        """Return arrays with any content."""
+        members, _, length = layers.message.shape
+        return cls(
+            room("stopped by pieces", (pieces, points, len(STATIONS), _ASIDES), BYTE),
+            room("open behind pieces", (pieces, points), BOOL),
+            room("messages of pieces", (members, pieces, whole(points), length), SINGLE),
+        )
+
+
+class Bench(NamedTuple):
+    """Arrays for a moment in compiled code, with any content.
+
+    Attributes:
+        relations: Relations of pieces (pieces, points, RELATIONS).
+        related: Scaled relations of solids, one row after the other (n,).
+        of_structures: Messages of structures (members, structures, rows, length).
+        constants: Inputs of the first layer that no layout changes (rows, n + length).
+        given: Open shares and messages of rows (n,).
+        middle: Four rows between the layers of messages (4, length).
+        between: Four rows after the first layer (4, width).
+        beyond: The same after the second one (4, width).
+        parts: Parts of the sums of the last layer (4, PARTS).
+    """
+
+    relations: FloatArray
+    related: SingleArray
+    of_structures: SingleArray
+    constants: SingleArray
+    given: SingleArray
+    middle: SingleArray
+    between: SingleArray
+    beyond: SingleArray
+    parts: SingleArray
+
+    @classmethod
+    def in_room(
+        cls, points: int, structures: int, layers: NetworkLayers, room: Room, pieces: int
+    ) -> "Bench":
+        """Return the arrays for a number of pieces."""
+        members, _, length = layers.message.shape
+        rows, (_, inputs, width) = whole(points), layers.constant.shape
+        solids = max(structures, pieces)
+        return cls(
+            room("relations of pieces", (pieces, points, RELATIONS), FLOAT),
+            room("related", (solids * rows * RELATIONS,), SINGLE),
+            room("messages of structures", (members, structures, rows, length), SINGLE),
+            room("constants", (rows, inputs), SINGLE),
+            room("given", (rows * layers.first.shape[1],), SINGLE),
+            room("middle", (ROWS_AT_ONCE, length), SINGLE),
+            room("between", (ROWS_AT_ONCE, width), SINGLE),
+            room("beyond", (ROWS_AT_ONCE, width), SINGLE),
+            room("parts", (ROWS_AT_ONCE, PARTS), SINGLE),
+        )
+
+
+class SiteArrays(NamedTuple):
+    """What compiled code takes of a site.
+
+    Attributes:
+        points: The points on the walls.
+        solids: Left, bottom, right, top and height of each structure, m (structures, 5).
+        curves: See `approach.curves`.
+    """
+
+    points: WallPoints
+    solids: FloatArray
+    curves: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+class Asked(NamedTuple):
+    """Charges with layouts against each of them.
+
+    Attributes:
+        charges: See `approach.charge_row` (charges, 5).
+        layouts: Number of layouts up to each charge (charges + 1,).
+        boxes: Left, bottom, right, top and height of the pieces of all layouts, m (pieces, 5).
+        pieces: Number of pieces up to each layout (layouts + 1,).
+    """
+
+    charges: FloatArray
+    layouts: IntArray
+    boxes: FloatArray
+    pieces: IntArray
+
+
+@compiled(nogil=True, error_model="numpy")
+def put_charges(
+    asked: Asked,
+    site: SiteArrays,
+    scales: Scales,
+    layers: NetworkLayers,
+    own: ApproachArrays,
+    base: SingleArray,
+    none: Pieces,
+    room: Pieces,
+    bench: Bench,
+    numbers: Numbers,
+    found: FloatArray,
+    farthest_m: FloatArray,
+) -> None:
+    """Put the logarithms of the loads of layouts against charges (members, layouts, structures).
+
+    Args:
+        asked: The charges and the layouts.
+        site: The site.
+        scales: The scales of inputs.
+        layers: The networks.
+        own: Room for what is known of a charge.
+        base: The same.
+        none: No pieces.
+        room: Room for the pieces of the layouts of a charge.
+        bench: Room for a moment.
+        numbers: Room for the numbers of the pieces of a layout (most + 1,).
+        found: The logarithms of loads.
+        farthest_m: Largest distance of a point from each charge (charges,).
+    """
+    members, most, rows, length = room.messages.shape
+    flat = room.messages.reshape(members * most * rows * length)
+    for charge in range(len(asked.charges)):
+        row = asked.charges[charge]
+        start_m, scale_m, fall_m = row[:3], row[3], row[4]
+        farthest_m[charge] = put_charge(
+            start_m, scale_m, fall_m, site, scales, layers, own, base, bench
+        )
+        # The pieces of all its layouts at once, in the order of the layouts.
+        before, after = asked.layouts[charge], asked.layouts[charge + 1]
+        first, last = asked.pieces[before], asked.pieces[after]
+        count = last - first
+        messages = flat[: members * count * rows * length].reshape((members, count, rows, length))
+        pieces = Pieces(room.stopped[:count], room.is_open[:count], messages)
+        boxes = asked.boxes[first:last]
+        put_pieces(boxes, start_m, scale_m, site.points, scales, layers, own, bench, pieces)
+        for layout in range(before, after):
+            number = 0
+            for piece in range(asked.pieces[layout], asked.pieces[layout + 1]):
+                numbers[number] = first - piece - 1
+                number += 1
+            numbers[number] = 0
+            put_loads(
+                numbers.reshape((1, len(numbers))),
+                site.points,
+                scales,
+                layers,
+                own,
+                base,
+                none,
+                pieces,
+                bench,
+                layout,
+                found,
+            )
+
+
+@compiled(nogil=True, error_model="numpy", inline="always")
+def put_charge(
+    start_m: FloatArray,
+    scale_m: float,
+    fall_m: float,
+    site: SiteArrays,
+    scales: Scales,
+    layers: NetworkLayers,
+    own: ApproachArrays,
+    base: SingleArray,
+    bench: Bench,
+) -> float:
+    """Put what is known of a charge without any piece; return the largest distance of a point.
+
+    Args:
+        start_m: Position of the charge (3,).
+        scale_m: Scaling length.
+        fall_m: Longest decay length of the weight of a detour.
+        site: The site.
+        scales: The scales of inputs.
+        layers: The networks.
+        own: What no layout changes.
+        base: Sums of the first layer over what no layout changes (members, rows, width).
+        bench: Room for a moment.
+    """
+    solids = site.solids
+    farthest_m: float = put_approach(
+        start_m, scale_m, fall_m, site.points, solids, site.curves, own
+    )
+    said = bench.of_structures
+    sending = layers.send, layers.send_bias, layers.message, layers.message_bias
+    _put_messages(own.relations, scales, sending, bench, said)
+    _put_base(own.features, scales, said, layers.constant, layers.first_bias, bench.constants, base)
+    return farthest_m
+
+
+@compiled(nogil=True, error_model="numpy", inline="always")
+def put_pieces(
+    boxes: FloatArray,
+    start_m: FloatArray,
+    scale_m: float,
+    points: WallPoints,
+    scales: Scales,
+    layers: NetworkLayers,
+    own: ApproachArrays,
+    bench: Bench,
+    found: Pieces,
+) -> None:
+    """Put what is known of pieces, each of which depends on no other; see `put_charge`."""
+    put_stopped_by(
+        start_m,
+        points.points_m,
+        own.by_m,
+        own.by_height_m,
+        boxes,
+        own.stopped,
+        own.is_straight_open,
+        found.stopped,
+        found.is_open,
+    )
+    relations = bench.relations[: len(boxes)]
+    put_relations(start_m, points.points_m, points.outward, scale_m, boxes, relations)
+    first = layers.piece_send, layers.piece_send_bias
+    sending = *first, layers.piece_message, layers.piece_message_bias
+    _put_messages(relations, scales, sending, bench, found.messages)
+
+
+@njit(error_model="numpy")
+def _put_messages(
+    relations: FloatArray,
+    scales: Scales,
+    sending: tuple[SingleArray, SingleArray, SingleArray, SingleArray],
+    bench: Bench,
+    found: SingleArray,
+) -> None:
+    """Put the messages of solids (members, solids, rows, length); the last point fills up rows."""
+    members, solids, rows, length = found.shape
+    related, number = bench.related, 0
+    for solid in range(solids):
+        for row in range(rows):
+            point = min(row, relations.shape[1] - 1)
+            for index in range(RELATIONS):
+                value = relations[solid, point, index] - scales.mean[FEATURES + index]
+                scaled = value / scales.scale[FEATURES + index]
+                related[number] = min(max(scaled, -scales.most), scales.most)
+                number += 1
+    given = related[:number].reshape((1, solids * rows, RELATIONS))
+    said = found.reshape((members, solids * rows, length))
+    put_two_layers(given, *sending, bench.middle, said)
+
+
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
+def _put_base(
+    features: Any,
+    scales: Scales,
+    messages: Any,
+    weights: Any,
+    bias: Any,
+    given: Any,
+    base: Any,
+) -> None:
+    """Put the sums of the first layer; see `put_charge`."""
+    own_frame()
+    members, rows, width = base.shape
+    solids, length = messages.shape[1], messages.shape[3]
+    constant, points, inputs = FEATURES - SHARES, len(features), given.shape[1]
+    # The first layer is linear before its bend, so that the sums over inputs that no layout changes
+    # are made once: W [c, s, m] = W_c c + W_s s + W_m m.
+    to, at, said = place(base), place(given), place(messages)
+    lanes, same = lanes_at(to), (0, 0, 0, 0)
+    for row in range(rows):
+        for index in range(constant):
+            value = features[min(row, points - 1), index]
+            scaled = (value - scales.mean[index]) / scales.scale[index]
+            given[row, index] = min(max(scaled, -scales.most), scales.most)
+    for member in range(members):
+        for row in range(rows):
+            for index in range(0, length, lanes):
+                heard = fill(at, np.float32(0.0))
+                for solid in range(solids):
+                    entry = ((member * solids + solid) * rows + row) * length
+                    heard = heard + load(said, entry + index)
+                store(at, row * inputs + constant + index, heard)
+        weight, biases = place(weights[member]), place(bias[member])
+        for row in range(0, rows, ROWS_AT_ONCE):
+            end = (member * rows + row) * width
+            four_sums(at, row * inputs, inputs, weight, width, biases, same, to, end)
+
+
+@njit(error_model="numpy")
+def _put_shares(
+    own: Any,
+    charge: ApproachArrays,
+    kept: Pieces,
+    new: Pieces,
+    scales: Scales,
+    inputs: int,
+    given: Any,
+) -> None:
+    """Put the scaled open shares of each row behind the pieces of a layout, before its messages."""
+    points, rows = len(charge.stopped), whole(len(charge.stopped))
+    below = np.empty((len(STATIONS), _ASIDES), dtype=np.uint8)
+    shares = np.empty(SHARES)
+    for point in range(points):
+        straight = charge.is_straight_open[point]
+        for station in range(len(STATIONS)):
+            for aside in range(_ASIDES):
+                below[station, aside] = charge.stopped[point, station, aside]
+        # 1. Several pieces stop as many detours by a place as the one that stops most.
+        for piece in own:
+            if piece == 0:
+                break
+            if piece > 0:
+                straight = straight and kept.is_open[piece - 1, point]
+                for station in range(len(STATIONS)):
+                    for aside in range(_ASIDES):
+                        stops = kept.stopped[piece - 1, point, station, aside]
+                        below[station, aside] = max(below[station, aside], stops)
+            else:
+                straight = straight and new.is_open[-piece - 1, point]
+                for station in range(len(STATIONS)):
+                    for aside in range(_ASIDES):
+                        stops = new.stopped[-piece - 1, point, station, aside]
+                        below[station, aside] = max(below[station, aside], stops)
+        # 2. The shares that are left, and 3. their scaled and bounded values.
+        shares[:] = 0.0
+        shares[-1] = 1.0 if straight else 0.0
+        for station in range(len(STATIONS)):
+            for aside in range(_ASIDES):
+                stops = below[station, aside]
+                left = charge.weights[point, station, (aside + 1) // 2, stops]
+                for fall in range(_FALLS):
+                    shares[station * _FALLS + fall] += left[fall]
+        for share in range(SHARES):
+            index = FEATURES - SHARES + share
+            scaled = (shares[share] - scales.mean[index]) / scales.scale[index]
+            given[point * inputs + share] = min(max(scaled, -scales.most), scales.most)
+    for row in range(points, rows):
+        for share in range(SHARES):
+            given[row * inputs + share] = given[(points - 1) * inputs + share]
+
+
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
+def put_loads(
+    layouts: Any,
+    walls: WallPoints,
+    scales: Scales,
+    layers: NetworkLayers,
+    charge: ApproachArrays,
+    base: Any,
+    kept: Pieces,
+    new: Pieces,
+    bench: Bench,
+    first_layout: int,
+    found: Any,
+) -> None:
+    """Put the logarithms of the loads of layouts against a charge (members, layouts, structures).
+
+    `first_layout` is where the first of them is in `found`. Pieces are numbered from 1 if they are
+    kept, and from -1 down if they are new; 0 ends a layout.
+    """
+    own_frame()
+    starts, area_m2 = walls.starts, walls.area_m2
+    members, rows, width = base.shape
+    of_kept, of_new, length = kept.messages.shape[1], new.messages.shape[1], new.messages.shape[3]
+    points, given = len(area_m2), bench.given
+    at, to, beside = place(given), place(bench.between), place(bench.beyond)
+    said, now_said, sums = place(kept.messages), place(new.messages), place(bench.parts)
+    lanes, same = lanes_at(at), (0, 0, 0, 0)
+    loads = np.empty(len(starts))
+    areas_m2 = np.zeros(len(starts))
+    for structure in range(len(starts)):
+        after = starts[structure + 1] if structure + 1 < len(starts) else points
+        for point in range(starts[structure], after):
+            areas_m2[structure] += area_m2[point]
+    for layout in range(len(layouts)):
+        own = layouts[layout]
+        # Nothing is said without a piece: the sums over messages are left out.
+        is_bare = own[0] == 0
+        inputs = SHARES if is_bare else SHARES + length
+        _put_shares(own, charge, kept, new, scales, inputs, given)
+        for member in range(members):
+            bases, to_first = place(base[member]), place(layers.first[member])
+            to_second, bias = place(layers.second[member]), place(layers.second_bias[member])
+            to_last = place(layers.last[member])
+            power, known = layers.powers[member], charge.logs[layers.kinds[member]]
+            loads[:] = 0.0
+            structure = 0
+            for row in range(0, rows, ROWS_AT_ONCE):
+                # 1. What the pieces say, added up.
+                for number in range(row, row + ROWS_AT_ONCE):
+                    for index in range(0, 0 if is_bare else length, 2 * lanes):
+                        low = high = fill(at, np.float32(0.0))
+                        for piece in own:
+                            if piece == 0:
+                                break
+                            if piece > 0:
+                                entry = ((member * of_kept + piece - 1) * rows + number) * length
+                                low = low + load(said, entry + index)
+                                high = high + load(said, entry + index + lanes)
+                            else:
+                                entry = ((member * of_new - piece - 1) * rows + number) * length
+                                low = low + load(now_said, entry + index)
+                                high = high + load(now_said, entry + index + lanes)
+                        store(at, number * inputs + SHARES + index, low)
+                        store(at, number * inputs + SHARES + index + lanes, high)
+                # 2. Four points through the layers, from memory read once.
+                bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
+                four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)
+                four_rows(to, 0, width, to_second, width, bias, same, beside, 0)
+                # 3. L = (sum of A L_i^p / sum of A)^(1 / p): p = 1 is the mean, a large p nearly
+                # the largest.
+                put_parts(beside, width, to_last, sums)
+                for number in range(min(ROWS_AT_ONCE, points - row)):
+                    differs = np.float32(0.0)
+                    for part in range(PARTS):
+                        differs += bench.parts[number, part]
+                    point = row + number
+                    while structure + 1 < len(starts) and point >= starts[structure + 1]:
+                        structure += 1
+                    of_point = known[point] + (differs + layers.last_bias[member])
+                    loads[structure] += area_m2[point] * exp(power * of_point)
+            for structure in range(len(starts)):
+                of_structure = log(loads[structure] / areas_m2[structure]) / power
+                found[member, first_layout + layout, structure] = of_structure
+
+
+def mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,).
+
+    Args:
+        logs: Logarithms of loads by each network (members, n); see `network.agreed`.
+    """
+    mean, spread = np.empty((2, logs.shape[1]))
+    _put_mean_and_spread(logs, np.empty(len(logs)), mean, spread)
+    return mean, spread
+
+
+@compiled(nogil=True, error_model="numpy")
+def _put_mean_and_spread(logs: Any, own: Any, mean: Any, spread: Any) -> None:
+    members, loads = logs.shape
+    cut = 1 if members > 2 else 0
+    for number in range(loads):
+        # 1. In rising order, by insertion; 2. the mean without the highest and the lowest.
+        total = 0.0
+        for member in range(members):
+            value, at = logs[member, number], member
+            total += value
+            while at and own[at - 1] > value:
+                own[at] = own[at - 1]
+                at -= 1
+            own[at] = value
+        middle = 0.0
+        for member in range(cut, members - cut):
+            middle += own[member]
+        mean[number] = exp(middle / (members - 2 * cut))
+        # 3. The standard deviation of all.
+        total /= members
+        squares = 0.0
+        for member in range(members):
+            squares += (own[member] - total) ** 2
+        spread[number] = sqrt(squares / members)
