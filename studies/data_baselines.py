@@ -20,11 +20,11 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.surrogate import Surrogate, packaged_surrogate
-from blast_env.surrogate.fitting import Predictions, errors_of
+from blast_env.surrogate.fitting import Predictions, errors_of, folds
 from blast_env.surrogate.network import Check
 from blast_env.surrogate.samples import Samples
 from blast_env.tables import markdown_table
-from studies.surrogate import EVERY, STAGES, held_out_of, named_rows, samples_of, stage_of
+from studies.surrogate import DATA, EVERY, named_rows, samples_of
 
 SEED: Final = 0
 """Seed of the order of sites in the fit of the packaged surrogate."""
@@ -123,8 +123,8 @@ def recorded(surrogate: Surrogate) -> Score:
 def main() -> None:
     """Print the errors of simple models and of the packaged surrogate on held-out sites."""
     with user_errors():
-        samples = samples_of(named_rows([path for stage in STAGES for path in stage]))
-        held_out = held_out_of(samples, stage_of(samples.scenario, STAGES), EVERY, SEED)
+        samples = samples_of(named_rows(DATA))
+        held_out = folds(samples.site, EVERY, SEED)[0]
         found = {**scores(samples, held_out), "packaged surrogate": recorded(packaged_surrogate())}
         headers = (
             f"impulses on {len(np.unique(samples.site[held_out]))} held-out sites",

@@ -19,7 +19,7 @@ from blast_env.surrogate.fitting import fit, folds, load_errors
 from blast_env.surrogate.network import Fit
 from blast_env.surrogate.samples import Samples
 from blast_env.tables import markdown_table
-from studies.surrogate import DATA, EVERY, MORE_DATA, named_rows, samples_of
+from studies.surrogate import DATA, EVERY, named_rows, samples_of
 
 BUNDLED: Final = Path("docs/data/gas_blasts.parquet")
 """Blasts on bundled sites, which no fit sees."""
@@ -57,7 +57,7 @@ def main(
     """
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors(), progress_bar("fits") as progress:
-        samples = samples_of(named_rows(data or (*DATA, *MORE_DATA)))
+        samples = samples_of(named_rows(data or DATA))
         others = samples_of(named_rows([other]))
         held_out = folds(samples.site, every, seed)[0]
         shares = sorted(share or SHARES)

@@ -16,7 +16,7 @@ import typer
 from blast_agents import packaged_agent
 
 from blast_env.answers.terminal import print_line
-from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.rules import random_layout
@@ -36,7 +36,6 @@ from blast_env.site import Scenario, load_scenario
 from blast_env.sites import ITEM_SITES
 from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate.fitting import (
-    Begun,
     Errors,
     LoadErrors,
     Predictions,
@@ -56,20 +55,9 @@ from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet")
-    for name in ("front", "close", "many", "kerb", "street")
+    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further")
 )
-"""Data of the packaged surrogate's first fit: blasts on generated sites."""
-
-MORE_DATA: Final = tuple(
-    Path(f"docs/data/{name}_site_blasts.parquet") for name in ("liked", "module")
-)
-"""Data with which that fit went on."""
-
-LATEST_DATA: Final = (Path("docs/data/further_site_blasts.parquet"),)
-"""Data with which it went on once more."""
-
-STAGES: Final = (DATA, MORE_DATA, LATEST_DATA)
-"""All of them, in this order."""
+"""Data of the packaged surrogate: blasts on generated sites."""
 
 EVERY: Final = 8
 """One of so many sites is held out of the fits."""
@@ -186,20 +174,10 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: 
 @app.command("fit")
 def fit_it(
     data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts.")] = None,
-    begin_with: Annotated[
-        Path | None,
-        typer.Option(help="Surrogate that the fit goes on from; it is of --data and --also."),
-    ] = None,
-    also: Annotated[
-        list[Path] | None, typer.Option(help="Tables with which that one went on before.")
-    ] = None,
-    more: Annotated[
-        list[Path] | None, typer.Option(help="Tables that it has not seen, for --begin-with.")
-    ] = None,
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
-    epochs: Annotated[int, typer.Option(min=1)] = 20,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over all blasts.")] = 60,
     every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = EVERY,
     seed: int = 0,
     device: Annotated[str, typer.Option(help="Device of torch.")] = "cpu",
@@ -212,18 +190,10 @@ def fit_it(
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
-        if (begin_with is None) != (not more):
-            raise BlastEnvError("--begin-with and --more go together: give both, or none")
-        tables = [data or DATA, also or (), more or ()]
-        named = named_rows([path for stage in tables for path in stage], without or ())
-        groups = named["scenario_hash"].groupby(stage_of(named["scenario"], tables)).nunique()
-        _check_held_out(sum(-(-group // every) for group in groups), every)  # at most so many
+        named = named_rows(data or DATA, without or ())
+        _check_held_out(-(-named["scenario_hash"].nunique() // every), every)  # at most so many
         samples = samples_of(named)
-        stage = stage_of(samples.scenario, tables)
-        held_out = held_out_of(samples, stage, every, seed)
-        begun = None
-        if begin_with is not None:
-            begun = Begun(load_surrogate(begin_with), stage < len(tables) - 1)
+        held_out = folds(samples.site, every, seed)[0]
         sites = len(np.unique(samples.site[held_out]))
         _check_held_out(sites, every)
         about = Fit(
@@ -234,7 +204,7 @@ def fit_it(
             sites=len(np.unique(samples.site[~held_out])),
         )
         began_s = perf_counter()
-        fitted = fit(samples, ~held_out, epochs, seed, about, device=device, begun=begun)
+        fitted = fit(samples, ~held_out, epochs, seed, about, device=device)
         seconds = round(perf_counter() - began_s, 1)
         impulse, peak = (
             Holdout.of(fitted, networks, samples, loads, held_out, seed)
@@ -250,35 +220,6 @@ def fit_it(
         )
         path = replace(fitted, fit=about).save(out)
         print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
-
-
-def stage_of(
-    scenarios: "np.ndarray | pd.Series[str]", tables: Sequence[Sequence[Path]]
-) -> IntArray:
-    """Return in which stage of data each scenario is, the last one that has it (scenarios,)."""
-    stage: IntArray = np.zeros(len(scenarios), dtype=np.int64)
-    for number, paths in enumerate(tables):
-        if paths:
-            stage[np.isin(scenarios, named_rows(paths)["scenario"].unique())] = number
-    return stage
-
-
-def held_out_of(samples: Samples, stage: IntArray, every: int, seed: int) -> BoolArray:
-    """Return the mask of the samples on held-out sites (samples,).
-
-    Sites of the first data that are held out stay so, whatever is added.
-
-    Args:
-        samples: All samples.
-        stage: In which stage each came to the data (samples,).
-        every: One of so many sites is held out, of each stage.
-        seed: Seed of their order.
-    """
-    held_out = np.zeros(len(samples), dtype=bool)
-    for number in np.unique(stage):
-        own = stage == number
-        held_out[own] = folds(samples.site[own], every, seed)[0]
-    return held_out
 
 
 def _check_held_out(sites: int, every: int) -> None:

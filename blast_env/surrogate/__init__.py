@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from blast_env.surrogate.engine import SurrogateEngine
     from blast_env.surrogate.fitting import (
         MEMBERS,
-        Begun,
         Predictions,
         errors,
         fit,
@@ -49,7 +48,6 @@ __all__ = [
     "SHAPES",
     "SHARES",
     "STATIONS",
-    "Begun",
     "Check",
     "Correction",
     "Fit",

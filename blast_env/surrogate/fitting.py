@@ -45,9 +45,6 @@ _DECAY: Final = 1e-3
 _MOST_GRADIENT: Final = 1.0
 """Bound on the norm of a gradient, against outliers among the groups."""
 
-_AGAIN: Final = 4
-"""In a fit that goes on, a pass has one in so many of the earlier samples; so falls the rate."""
-
 _THINNING: Final = 2
 """One in so many points of a wall is used in an update."""
 
@@ -71,7 +68,6 @@ def fit(
     members: int = MEMBERS,
     peaks: bool = True,
     device: str = "cpu",
-    begun: "Begun | None" = None,
 ) -> Surrogate:
     """Fit the networks to some of the samples, two networks at a time.
 
@@ -84,60 +80,28 @@ def fit(
         members: Number of networks per kind of load.
         peaks: Whether to fit the networks for peaks, too.
         device: Device of torch; the fit depends on it by rounding.
-        begun: The surrogate that the fit goes on from, and what that one was fitted to.
     """
-    # 1. Inputs are scaled by the data of the first fit, which a fit that goes on must keep.
-    old = np.zeros(len(samples), dtype=bool) if begun is None else begun.samples
-    if begun is None:
-        mean, scale = _scales(samples, chosen)
-    else:
-        mean, scale = begun.surrogate.mean, begun.surrogate.scale
-    own, again = (_cases(samples, chosen & mask) for mask in (~old, old))
+    # 1. Inputs are scaled by the data of the fit.
+    mean, scale = _scales(samples, chosen)
+    cases = _cases(samples, chosen)
     tensors = _Tensors.of(samples, mean, scale, device)
     # 2. One network for each kind of load and seed: an ensemble, whose spread tells where it does
     # not know (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017).
     tasks = []
-    for loads, kind in ((samples.impulse, "impulse"), (samples.peak, "peak"))[: 1 + peaks]:
+    for loads in (samples.impulse, samples.peak)[: 1 + peaks]:
         for number in range(members):
             torch.manual_seed(seed + number)
             network = _Network()
-            if begun is not None:
-                network.take(getattr(begun.surrogate, kind).members[number])
             tasks.append((network.to(device), _Target.of(loads, device), seed + number))
 
     def fitted(task: tuple["_Network", "_Target", int]) -> Member:
-        start = task[0].plain()
-        found = _fitted(tensors, own, again, epochs, *task)
-        return found if begun is None else _between(start, found)
+        return _fitted(tensors, cases, epochs, *task)
 
     # 3. Two at a time, since torch leaves the interpreter to others while it multiplies.
     with ThreadPoolExecutor(2) as pool:
         found = [*pool.map(fitted, tasks)]
     impulse, peak = found[:members], found[members:]
     return Surrogate(mean, scale, Networks(impulse), Networks(peak), about)
-
-
-@dataclass(frozen=True, eq=False)
-class Begun:
-    """A surrogate that a fit goes on from.
-
-    Attributes:
-        surrogate: The surrogate.
-        samples: Mask of the samples of its own data (samples,). A pass has a quarter of them,
-            drawn anew, so that it does not forget them.
-    """
-
-    surrogate: Surrogate
-    samples: BoolArray
-
-
-def _between(one: Member, other: Member) -> Member:
-    """Return the network halfway between two, one of which the fit of the other began with.
-
-    Such a mean keeps what the first knew of other sites than those of the second fit (Wortsman and
-    others, Robust fine-tuning, CVPR 2022).
-    """
-    return Member(*(0.5 * (first + second) for first, second in zip(one, other, strict=True)))
 
 
 def _scales(samples: Samples, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
@@ -533,12 +497,6 @@ class _Network(nn.Module):
         said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
         return said
 
-    def take(self, member: Member) -> None:
-        """Take over weights and biases."""
-        with torch.no_grad():
-            for parameter, array in zip(self.parameters(), member, strict=True):
-                parameter.copy_(torch.from_numpy(np.ascontiguousarray(array.T)))
-
     def plain(self) -> Member:
         """Return the weights and biases as arrays."""
         arrays: Sequence[FloatArray] = [
@@ -550,31 +508,24 @@ class _Network(nn.Module):
 def _fitted(
     data: _Tensors,
     cases: Sequence[IntArray],
-    again: Sequence[IntArray],
     epochs: int,
     network: _Network,
     target: _Target,
     seed: int,
 ) -> Member:
-    """Fit one network to the samples of some cases, and to some of those that it has met."""
+    """Fit one network to the samples of some cases."""
     rng = np.random.default_rng(seed)
-    # 1. Cases in groups of a few samples; those of an earlier fit in part, and more slowly.
-    groups, met = _groups(cases, rng), _groups(again, rng)
-    drawn, new = len(met) // _AGAIN, np.arange(len(groups))
-    rate = _RATE / _AGAIN if met else _RATE
-    groups += met
+    # 1. Cases in groups of a few samples.
+    groups = _groups(cases, rng)
     # 2. AdamW (Loshchilov & Hutter, ICLR 2019), with a rate that rises and falls once (Smith &
     # Topin, Super-convergence, 2019).
-    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=_DECAY)
-    batches = max(1, round((len(new) + drawn) / _BATCH))
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=epochs * batches)
+    optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
+    batches = max(1, round(len(groups) / _BATCH))
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
     # 3. Passes over all groups, in a new order each time; gradients are clipped, because a few
     # groups are outliers (Pascanu, Mikolov & Bengio, ICML 2013).
     for epoch in range(epochs):
-        shown = new
-        if met:
-            shown = np.append(new, len(new) + rng.choice(len(met), drawn, replace=False))
-        for batch in np.array_split(rng.permutation(shown), batches):
+        for batch in np.array_split(rng.permutation(len(groups)), batches):
             loss = data.loss(network, target, [groups[number] for number in batch], rng)
             if not torch.isfinite(loss):
                 raise BlastEnvError(f"network of seed {seed} in epoch {epoch}: no finite error")

@@ -73,18 +73,6 @@ SHAPES: Final = (*_SENDING, *_SENDING) + (
 )
 """Shapes of the arrays of a network, in the order of `Member`."""
 
-_BEFORE: Final = 4
-"""The format before, whose files are read, too."""
-
-_RELATIONS_BEFORE: Final = 15
-_SHAPES_BEFORE: Final = (
-    (_RELATIONS_BEFORE, MESSAGE),
-    *_SENDING[1:],
-    (FEATURES + MESSAGE, HIDDEN),
-    *SHAPES[2 * len(_SENDING) + 1 :],
-)
-"""Shapes of its arrays: structures and pieces had the same networks, and fewer relations."""
-
 
 class Check(BaseModel):
     """Errors of the predictions of one kind of load on sites held out of the fit.
@@ -123,7 +111,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[4, 5] = 5
+    format: Literal[5] = 5
     command: str
     versions: dict[str, str]
     engine: str
@@ -542,17 +530,10 @@ def load_surrogate(path: str | Path) -> Surrogate:
         raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
     mean, scale = np.array(content.mean), np.array(content.scale)
     impulse, peak = (
-        Networks([_member(member, content.fit.format) for member in members])
+        Networks([_member(member) for member in members])
         for members in (content.members, content.peak_members)
     )
-    more = INPUTS - len(mean)
-    return Surrogate(
-        np.append(mean, np.zeros(more)),
-        np.append(scale, np.ones(more)),
-        impulse,
-        peak,
-        content.fit.model_copy(update={"format": _BEFORE + 1}),
-    )
+    return Surrogate(mean, scale, impulse, peak, content.fit)
 
 
 @cache
@@ -581,14 +562,10 @@ class _File(BaseModel):
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:
-        shapes: Sequence[tuple[int, ...]] = SHAPES
-        inputs = INPUTS
-        if self.fit.format == _BEFORE:
-            shapes, inputs = _SHAPES_BEFORE, FEATURES + _RELATIONS_BEFORE
         for name, numbers in (("mean", self.mean), ("scale", self.scale)):
-            if len(numbers) != inputs:
-                raise ValueError(f"{name} has {len(numbers)} numbers, must be {inputs}")
-        wanted = [prod(shape) for shape in shapes]
+            if len(numbers) != INPUTS:
+                raise ValueError(f"{name} has {len(numbers)} numbers, must be {INPUTS}")
+        wanted = [prod(shape) for shape in SHAPES]
         for name, members in (("members", self.members), ("peak_members", self.peak_members)):
             for number, member in enumerate(members):
                 sizes = [len(flat) for flat in member]
@@ -601,18 +578,10 @@ def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
     return [[_numbers(array) for array in member] for member in members]
 
 
-def _member(flat: Sequence[Sequence[float]], form: int) -> Member:
-    """Return a network from its flat lists; one of the format before gets the further inputs."""
-    shapes = _SHAPES_BEFORE if form == _BEFORE else SHAPES
-    arrays = [np.array(item).reshape(shape) for item, shape in zip(flat, shapes, strict=True)]
-    if form != _BEFORE:
-        return Member(*arrays)
-    # Further relations have no weight at first, and pieces the same networks as structures.
-    send, first = arrays[0], arrays[len(_SENDING)]
-    more = np.zeros((RELATIONS - len(send), send.shape[1]))
-    sending = [np.concatenate((send, more)), *arrays[1 : len(_SENDING)]]
-    both = np.concatenate((first, first[FEATURES:]))
-    return Member(*(*sending, *sending, both, *arrays[len(_SENDING) + 1 :]))
+def _member(flat: Sequence[Sequence[float]]) -> Member:
+    """Return a network from its flat lists."""
+    arrays = (np.array(item).reshape(shape) for item, shape in zip(flat, SHAPES, strict=True))
+    return Member(*arrays)
 
 
 def _numbers(array: AnyFloats) -> list[float]:

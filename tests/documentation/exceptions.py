@@ -191,21 +191,12 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.packaged_agent judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street": "--charges 2",
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate fit --out first.json": (
-        "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
-    ),
-    "python -m studies.surrogate fit --begin-with first.json --more"
-    " docs/data/liked_site_blasts.parquet --more docs/data/module_site_blasts.parquet --epochs 20"
-    " --out second.json": "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4",
-    "python -m studies.surrogate fit --begin-with second.json --also"
-    " docs/data/liked_site_blasts.parquet --also docs/data/module_site_blasts.parquet --more"
-    " docs/data/further_site_blasts.parquet --epochs 16 --out surrogate.json": (
+    "python -m studies.surrogate fit --out surrogate.json": (
         "--data docs/data/close_site_blasts.parquet --epochs 1 --every 4"
     ),
     "python -m studies.surrogate blasts --kind square_sites --sites 100 --layouts 8 --rules 7"
-    " --surrogate first.json --favourites 5 --changes 100 --draws 5 --threats 2 --cache blasts": (
-        "--sites 1 --layouts 1 --rules 1 --favourites 1 --draws 1 --threats 1"
-    ),
+    " --surrogate surrogate.json --favourites 5 --changes 100 --draws 5 --threats 2 --cache"
+    " blasts": ("--sites 1 --layouts 1 --rules 1 --favourites 1 --draws 1 --threats 1"),
     "python -m studies.blast_table blasts --kind square_sites --sites 100 --out blasts.parquet": (
         "--sites 1"
     ),
