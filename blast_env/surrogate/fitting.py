@@ -94,12 +94,9 @@ def fit(
             network = _Network()
             tasks.append((network.to(device), _Target.of(loads, device), seed + number))
 
-    def fitted(task: tuple["_Network", "_Target", int]) -> Member:
-        return _fitted(tensors, cases, epochs, *task)
-
     # 3. Two at a time, since torch leaves the interpreter to others while it multiplies.
     with ThreadPoolExecutor(2) as pool:
-        found = [*pool.map(fitted, tasks)]
+        found = [*pool.map(lambda task: _fitted(tensors, cases, epochs, *task), tasks)]
     impulse, peak = found[:members], found[members:]
     return Surrogate(mean, scale, Networks(impulse), Networks(peak), about)
 
