@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import blast_env
-from blast_env.design.rules import wall_near_building
 from blast_env.io.importing import ImportOptions, import_site
+from blast_env.rules import wall_near_building
 
 MAP = Path(__file__).parents[1] / "docs" / "data" / "pump_house.geojson"
 

@@ -23,7 +23,6 @@ from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import progress_bar, user_errors
-from blast_env.design.rules import random_layout
 from blast_env.design.search import DesignProblem, layouts_by_rule
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet, draw_threats
@@ -34,6 +33,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import INK, STANDING, Feature, Kinds, site_features, without
 from blast_env.plots.site_plan import draw_plan, legend_of, write_legend
 from blast_env.plots.style import unit_interval
+from blast_env.rules import random_layout
 from blast_env.runner import run_all
 from blast_env.site import Scenario, ScenarioError
 from blast_env.sites import (

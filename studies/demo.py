@@ -22,7 +22,6 @@ from sb3_contrib import MaskablePPO
 from blast_env.answers.document import interval, percent
 from blast_env.answers.terminal import print_line, print_table
 from blast_env.cli.output import progress_bar, user_errors
-from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import Transition
@@ -46,6 +45,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.plots.film import write_film
 from blast_env.plots.gas import facades
 from blast_env.plots.site_picture import site_picture
+from blast_env.rules import random_layout
 from blast_env.site import Scenario, load_scenario
 from blast_env.surrogate import SurrogateEngine, SurrogateSite, site_of
 from blast_env.surrogate.correction import Correction

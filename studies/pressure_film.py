@@ -11,10 +11,10 @@ import typer
 
 from blast_env.answers.terminal import print_line
 from blast_env.cli.output import progress_bar, user_errors
-from blast_env.design.rules import wall_near_building
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.plots.film import write_film
 from blast_env.plots.pressure_frames import VerticalSection
+from blast_env.rules import wall_near_building
 from blast_env.site import Charge, load_scenario
 
 SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"

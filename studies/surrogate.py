@@ -19,7 +19,6 @@ from blast_env.answers.terminal import print_line
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import progress_bar, user_errors
-from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved
 from blast_env.design.search.moves import Moves, random_walls
@@ -31,6 +30,7 @@ from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.parquet import read_frame
 from blast_env.provenance import command, versions
+from blast_env.rules import random_layout
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import ITEM_SITES

@@ -21,7 +21,6 @@ from safetensors.numpy import load, save
 
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, case_for, improved
 from blast_env.design.search.package import LEAST_GAIN, proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
@@ -30,6 +29,7 @@ from blast_env.evaluation import DesignProblem
 from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.batch import LayoutBatch, PlacementRules
+from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
 from blast_env.surrogate import Surrogate, packaged_surrogate
 from blast_env.values import generator, whole_number

@@ -45,7 +45,6 @@ from blast_env.cli.output import (
 )
 from blast_env.design.by_atlas import word_on
 from blast_env.design.proposal import problem_of, search_problem
-from blast_env.design.rules import expected_charge
 from blast_env.design.search import (
     DesignProblem,
     Progress,
@@ -76,6 +75,7 @@ from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.layout import load_layout, write_layout
 from blast_env.provenance import command, versions
+from blast_env.rules import expected_charge
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.zone import source_bounds_m

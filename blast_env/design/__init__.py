@@ -1,13 +1,14 @@
 """The choice of a layout: rules and optimisers."""
 
-from blast_env.design.bollards import line_of_posts, posts_and_wall
-from blast_env.design.rules import (
+from blast_env.rules import (
     NEAR_BUILDING,
     NEAR_CHARGE,
     expected_charge,
     hardening_alone,
     hardening_and_sight_lines,
+    line_of_posts,
     line_of_sight_wall,
+    posts_and_wall,
     random_layout,
     ring_around_building,
     ring_around_charge,

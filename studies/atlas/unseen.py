@@ -15,13 +15,13 @@ from blast_agents import packaged_agent
 
 from blast_env.arrays import FloatArray
 from blast_env.atlas import packaged_laws
-from blast_env.design.rules import random_layout, wall_near_building
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import BayScreening, screen
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Layout
 from blast_env.layout import charge_against, check_layout
 from blast_env.layout.build_site import draw_charge
+from blast_env.rules import random_layout, wall_near_building
 from blast_env.site import AnyCharge, Scenario
 from blast_env.sites import court_site, kerb_site, square_site, street_site
 from studies.atlas.sites import bays_by_gas, under_charge

@@ -13,11 +13,11 @@ from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import CacheOption, ClusterAddress, resume_words, running_on
 from blast_env.cli.output import progress_bar, resumable, user_errors
-from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import draw_charge
 from blast_env.results import EndReason
+from blast_env.rules import random_layout, wall_near_building, wall_near_charge
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.blast_site import Charge

@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from blast_env.arrays import FloatArray
-from blast_env.design.rules import random_layout
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.geometry import Layout
 from blast_env.response.facade import respond
 from blast_env.response.levels import LevelOfProtection
 from blast_env.results import EndReason
+from blast_env.rules import random_layout
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import FAMILIES, generate_site
 from blast_env.store import Store

@@ -22,11 +22,11 @@ from blast_env.design.search import (
     RuleProposer,
     SearchResult,
     SurrogateSearch,
-    by_rule,
     layouts_by_rule,
     registry,
 )
 from blast_env.errors import BlastEnvError
+from blast_env.rules import RuleRow, table
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner
@@ -49,8 +49,8 @@ OWN = {
 @pytest.fixture(autouse=True)
 def two_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the lines: the files are `tests/design/corner.py` and `one_after_another.py`."""
-    corner = {"corner": OWN["corner"]}
-    monkeypatch.setattr(by_rule, "RULES", MappingProxyType({**by_rule.RULES, **corner}))
+    corner = {"corner": RuleRow("from the corner", fill_from_the_corner)}
+    monkeypatch.setattr(table, "RULES", MappingProxyType({**table.RULES, **corner}))
     monkeypatch.setattr(registry, "_TABLE", MappingProxyType({**registry._TABLE, **OWN}))
 
 

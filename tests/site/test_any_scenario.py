@@ -29,7 +29,7 @@ PUBLIC = (
     "blast_env.evaluation",
     "blast_env.io.export",
     "blast_env.sites",
-    "blast_env.design.rules",
+    "blast_env.rules.walls",
     "blast_env.design.proposal",
     "blast_env.design.search",
     "blast_agents.training",

@@ -14,13 +14,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.design.bollards import line_of_posts, posts_and_wall
-from blast_env.design.search.by_rule import RULES
 from blast_env.design.search.learnt import case_for
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import vehicle_reach
+from blast_env.rules import RULES, line_of_posts, posts_and_wall
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue

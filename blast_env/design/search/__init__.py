@@ -14,11 +14,9 @@ if TYPE_CHECKING:
         only,
     )
     from blast_env.design.search.by_rule import (
-        Need,
         ProposerKind,
         ProposerRow,
         RuleProposer,
-        layouts_by_rule,
     )
     from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
     from blast_env.design.search.learnt import Guesses, SurrogateSearch, improved, search_by
@@ -42,6 +40,7 @@ if TYPE_CHECKING:
     from blast_env.design.search.session import Plan, Search, SearchEndedError, SearchSession
     from blast_env.evaluation import DesignProblem
     from blast_env.geometry import Layout
+    from blast_env.rules import Need, layouts_by_rule
 else:
     __getattr__, __dir__ = on_first_use(__name__)
 

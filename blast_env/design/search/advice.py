@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.moves import Moves, legal_part
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError, DesignProblem
@@ -22,6 +21,7 @@ from blast_env.geometry import Layout, Measure
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
 from blast_env.response.levels import worst
+from blast_env.rules import layouts_by_rule
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.moves import Moves
 from blast_env.design.search.problem import Progress, Report, SamplingAgent, SearchResult
 from blast_env.design.search.session import Plan, Search, SearchSession
@@ -17,6 +16,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import one_per_charge, search_set
 from blast_env.geometry import Layout
+from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, Scenario
 from blast_env.surrogate.correction import Correction
 from blast_env.surrogate.network import Surrogate, packaged_surrogate

@@ -5,12 +5,12 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.design.rules import random_layout
 from blast_env.design.search.by_rule import rule_layouts
 from blast_env.design.search.moves import Draw, Moves, random_walls
 from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Layout
+from blast_env.rules import random_layout
 
 
 @dataclass(frozen=True)

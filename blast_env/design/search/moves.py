@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray
-from blast_env.design.rules import random_element
 from blast_env.errors import LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.layout import LayoutState
+from blast_env.rules import random_element
 from blast_env.site import Catalogue, Scenario
 
 Draw = Callable[[Scenario, np.random.Generator], Layout]

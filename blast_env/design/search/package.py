@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.design.search.by_rule import layouts_by_rule
 from blast_env.design.search.problem import Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Element, Layout, Removal
+from blast_env.rules import layouts_by_rule
 from blast_env.statistics import reductions
 from blast_env.vehicles.worst_places import stand_off_m
 

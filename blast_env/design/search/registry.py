@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.design.search.by_rule import RULES, ProposerKind, ProposerRow
+from blast_env.design.search.by_rule import ProposerKind, ProposerRow, rule_rows
 from blast_env.design.search.evolution import GeneticSearch, Nsga2Search
 from blast_env.design.search.methods import BestRuleSearch, PopulationAnnealingSearch, RandomSearch
 from blast_env.design.search.package import PackageProposer
@@ -36,7 +36,7 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
         "random": ProposerRow(RandomSearch, "random search"),
         "best_rule": ProposerRow(BestRuleSearch, "the best rule"),
         "surrogate": ProposerRow(_by_surrogate, "search by the surrogate", ProposerKind.LEARNT),
-        **RULES,
+        **rule_rows(),
     }
 )
 

@@ -10,11 +10,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.design.rules import NEAR_CHARGE, wall_added_to
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import worst_places
+from blast_env.rules.walls import NEAR_CHARGE, wall_added_to
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleSource, find_scenario
 from blast_env.units import MODULE_SIDE_M
 
