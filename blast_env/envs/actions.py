@@ -1,20 +1,33 @@
-"""Action spaces: an action gives a complete placement, or a part of it."""
+"""Action spaces: an action is a placement, a part of it, or whose next piece to take."""
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.site import AnySource, Catalogue, Scenario
+from blast_env.site import (
+    AnyCharge,
+    AnySource,
+    Catalogue,
+    Charge,
+    PointSource,
+    Scenario,
+    VehicleCharge,
+    VehicleSource,
+)
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import whole_number
+
+if TYPE_CHECKING:
+    from blast_env.rules import RuleRow
 
 
 class ActionCode(Protocol):
@@ -114,6 +127,30 @@ class Dimensions:
         return np.hstack((of_variants | nothing, of_rows, of_columns | nothing)).astype(np.int8)
 
 
+class NumberedActions(Protocol):
+    """The numbered actions on a site; without a known charge, against all of its sources."""
+
+    @property
+    def finish(self) -> int:
+        """The action that finishes; the others are below it."""
+
+    @property
+    def are_plain(self) -> bool:
+        """Whether each action is a placement, so that the legal places are the mask."""
+
+    def mask(self, chosen: "ActionChoice") -> BoolArray:
+        """Return the mask of legal actions after the choices so far (actions,)."""
+
+    def narrowed(self, chosen: "ActionChoice", action: int) -> "ActionChoice | int | None":
+        """Return the choices after an action, the element to place, or `None` if it is illegal."""
+
+    def nearest(self, chosen: "ActionChoice", action: int) -> int | None:
+        """Return the action to take in the place of an illegal one; `None` for none."""
+
+    def with_sources(self, sources: tuple[AnySource, ...]) -> "NumberedActions":
+        """Return the actions for other places of the charge, as shown to the agent."""
+
+
 class Actions(Protocol):
     """A kind of action space: the sequence of choices that makes up a placement."""
 
@@ -127,6 +164,15 @@ class Actions(Protocol):
             (variants, rows, columns). Of several placements that all choices leave, the one nearest
             to the line of sight is taken.
         """
+
+    def numbered(self, scenario: Scenario, representative: Scenario) -> NumberedActions:  # noqa: ARG002
+        """Return the numbered actions on a site.
+
+        Args:
+            scenario: The scenario.
+            representative: The scenario that the spaces of the environment are those of.
+        """
+        return ActionNumbers.of(self, scenario)
 
     def code(self, catalogue: Catalogue, count: int) -> ActionCode:  # noqa: ARG002
         """Return how agents write the actions, of which there are `count`: as numbers."""
@@ -209,6 +255,19 @@ class RowAcrossSight(Actions):
 
 
 @dataclass(frozen=True)
+class Suggested(PlaceAtOnce):
+    """The next piece of the layout that one of the rules of thumb proposes, or to finish.
+
+    There is an action for each rule that suits the representative scenario. Again and again it
+    builds the rule's layout; by turns, pieces of several layouts make a new one.
+    """
+
+    def numbered(self, scenario: Scenario, representative: Scenario) -> NumberedActions:
+        """Return the suggestions on a site."""
+        return Suggestions.of(scenario, representative)
+
+
+@dataclass(frozen=True)
 class _Sight:
     """The line from the mean place of a charge to the mean of the protected structures' centres.
 
@@ -267,6 +326,7 @@ ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
         "item_then_place": ItemThenPlace(),
         "item_then_block": ItemThenPlace(block_cells=8),
         "row": RowAcrossSight(),
+        "suggestion": Suggested(),
     }
 )
 """The action spaces, by their names."""
@@ -454,3 +514,112 @@ class ActionNumbers:
                 place = np.where(candidates, distances, np.inf).argmin()
                 return int(self.first[chosen.choices] + options.flat[place])
         return None
+
+
+# ---- Suggestions.
+
+
+_MOST_CHARGES: Final = 64
+"""Most charges of a site for which the layouts of the rules are kept."""
+
+_NOTHING: Final = -1
+"""In the place of an element's number: the layout has no further one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestions:
+    """The suggestions on a site, numbered by the rules, then to finish.
+
+    Attributes:
+        scenario: The scenario.
+        rules: The rules.
+        charge: The charge as the rules know it; `None` for all of the scenario.
+    """
+
+    scenario: Scenario
+    rules: "tuple[RuleRow, ...]"
+    charge: AnyCharge | None = None
+    _kept: "OrderedDict[AnyCharge, Suggestions]" = field(default_factory=OrderedDict, repr=False)
+
+    @classmethod
+    def of(cls, scenario: Scenario, representative: Scenario) -> "Suggestions":
+        """Return the suggestions against all charges of a scenario.
+
+        Args:
+            scenario: The scenario.
+            representative: The scenario whose rules they are; of those without a layout for
+                `scenario`, none is legal.
+        """
+        from blast_env.rules import RULES  # only where they are asked for
+
+        rules = tuple(row for row in RULES.values() if row.suits(representative))
+        return cls(scenario, rules)
+
+    def with_sources(self, sources: tuple[AnySource, ...]) -> "Suggestions":
+        """Return the suggestions where an agent is shown a single charge, or all of them."""
+        charge = _shown_charge(self.scenario, sources)
+        if charge is None:
+            return self
+        found = self._kept.get(charge)
+        if found is None:
+            found = self._kept[charge] = Suggestions(self.scenario, self.rules, charge)
+            if len(self._kept) > _MOST_CHARGES:
+                self._kept.popitem(last=False)
+        return found
+
+    @cached_property
+    def numbers(self) -> IntArray:
+        """Numbers in the catalogue of each layout's elements in their order, then -1 (rules, most).
+
+        A rule without a layout has no element.
+        """
+        layouts = [rule.layout(self.scenario, self.charge) or () for rule in self.rules]
+        numbers = np.full((len(layouts), max(map(len, layouts), default=0) or 1), _NOTHING)
+        for row, layout in zip(numbers, layouts, strict=True):
+            row[: len(layout)] = [self.scenario.zone.catalogue.action(item) for item in layout]
+        return numbers
+
+    @property
+    def finish(self) -> int:
+        """The action that finishes."""
+        return len(self.rules)
+
+    @property
+    def are_plain(self) -> bool:
+        """Whether each action is a placement: none is."""
+        return False
+
+    def mask(self, chosen: ActionChoice) -> BoolArray:
+        """Return the mask of the rules with a piece that is legal now, and of finishing."""
+        mask = np.ones(self.finish + 1, dtype=np.bool_)
+        mask[:-1] = self._legal(chosen).any(axis=1)
+        return mask
+
+    def narrowed(self, chosen: ActionChoice, action: int) -> int | None:
+        """Return the number of the next legal piece of a rule's layout; `None` without one.
+
+        A piece that is placed is not legal again.
+        """
+        legal = self._legal(chosen)[action]
+        return int(self.numbers[action, legal.argmax()]) if legal.any() else None
+
+    def nearest(self, chosen: ActionChoice, action: int) -> int:  # noqa: ARG002
+        """Return to finish: a rule whose layout is complete has had its say."""
+        return self.finish
+
+    def _legal(self, chosen: ActionChoice) -> BoolArray:
+        """Return which elements of each layout are legal now (rules, most)."""
+        legal: BoolArray = chosen.possible.ravel()[self.numbers] & (self.numbers != _NOTHING)
+        return legal
+
+
+def _shown_charge(scenario: Scenario, sources: tuple[AnySource, ...]) -> AnyCharge | None:
+    """Return the charge that an agent is shown as rules know it; `None` if it is hidden."""
+    if len(sources) != 1 or sources == scenario.charge:
+        return None
+    (source,) = sources
+    if isinstance(source, VehicleSource):
+        return VehicleCharge(source)
+    if isinstance(source, PointSource):
+        return Charge(source.position_m, source.tnt_kg, source.height_m)
+    return None

@@ -74,6 +74,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
     whose legal place nearest to the line is taken. With `"item_then_place"` or `"item_then_block"`
     the variant comes before the cell.
 
+    `action="suggestion"` has few actions on any site, `Discrete(rules + 1)`: at `reset` each rule
+    of thumb proposes a layout against the charge that is shown, or against all places of a hidden
+    one. An action places the next piece of a rule's layout that is legal, the last one finishes.
+    Repeated, an action builds the rule's layout; by turns they mix what rules propose. A rule that
+    has nothing more to place is masked, and finishes.
+
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
     image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for
@@ -155,8 +161,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, `"relative"`, or a `Reward` or `EndReward`.
             observation: `"image"`, `"grid"`, `"features"`, `"dict"`, or an `Observation`.
-            action: `"dimensions"`, `"place"`, `"row"`, `"item_then_place"`, `"item_then_block"`, or
-                `Actions`.
+            action: `"dimensions"`, `"place"`, `"row"`, `"item_then_place"`, `"item_then_block"`,
+                `"suggestion"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.
             realisations: Number of blasts per charge; default 2 for a visible charge, 1 for

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.envs.actions import ActionChoice, ActionNumbers, Actions
+from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observable import (
     MASK,
@@ -137,7 +137,7 @@ class _Shown:
 
     observable: Observable
     observation: EpisodeObservation
-    actions: ActionNumbers
+    actions: NumberedActions
     charges: tuple[AnyCharge, ...]
     case: LoadCaseSet | None
 
@@ -160,7 +160,7 @@ class _Site:
     evaluator: BlastEvaluator
     empty: LayoutState
     rules: PlacementRules
-    actions: ActionNumbers
+    actions: NumberedActions
     shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
     outcomes: dict[int, Mapping[str, Any]] = field(default_factory=dict)
@@ -180,7 +180,7 @@ class _Site:
             BlastEvaluator(scenario, task.engine, cache=task.store, counts=task.counts),
             empty,
             PlacementRules.of(empty),
-            ActionNumbers.of(task.actions, scenario),
+            task.actions.numbered(scenario, task.source.representative),
         )
 
     def no_outcome(self, charges: int) -> Mapping[str, Any]:
@@ -509,6 +509,8 @@ class Episodes:
         if found is None:
             episode.invalid_actions += 1
             nearest = actions.nearest(choice, action) if self.task.illegal.moves else None
+            if nearest == actions.finish:
+                return _FINISHES
             found = None if nearest is None else actions.narrowed(choice, nearest)
         if found is None:
             return _ILLEGAL

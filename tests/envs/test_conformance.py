@@ -63,6 +63,8 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
         {"observation": "dict", "action": "item_then_place", "invalid_action": "penalty"},
         {"observation": "dict", "action": "item_then_block"},
         {"observation": "dict", "action": "row"},
+        {"observation": "dict", "action": "suggestion"},
+        {"observation": "features", "action": "suggestion", "threat": "hidden", "threats": 2},
     ],
 )
 def test_both_checkers_pass_on_every_variant(chosen: dict[str, Any]) -> None:

@@ -87,6 +87,7 @@ def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
         {"scenario": "control_room", "observation": "features", "action": "place"},
         {"scenario": "control_room", "observation": "image", "action": "row"},
         {"scenario": "control_room", "observation": "dict", "action": "item_then_block"},
+        {"scenario": "control_room", "observation": "dict", "action": "suggestion"},
         {"scenario": "control_room", "threat": "hidden", "threats": 4, "reward": "relative"},
         {"scenario": "control_room", "reward": "incremental", "invalid_action": "penalty"},
     ],
