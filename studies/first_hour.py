@@ -13,26 +13,36 @@ import gymnasium as gym
 import numpy as np
 import torch
 import typer
+from blast_agents import packaged_agent
+from blast_agents.training import BatchVecEnv
 from blast_agents.training.environments import ThreatPool
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv
 
 from blast_env.answers.terminal import print_line, print_table
 from blast_env.arrays import FloatArray
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import Reward
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
 from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Charge, Scenario, VehicleCharge, VehicleSource
+from blast_env.sites import FAMILIES, Ranges, SiteSource
 from blast_env.statistics import mean_estimate
 
 HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
 
 RANDOM: Final = "random"
+
+SUGGESTED: Final = "random suggestions"
+
+ROLLOUT: Final = 2048
+"""Steps of a rollout, the default of both algorithms for one environment."""
 
 Agent = PPO | MaskablePPO
 KNOWN: Final[dict[str, type[Agent]]] = {
@@ -45,30 +55,58 @@ class Setting:
     """What is learnt on; observations are the vector `"features"`.
 
     Attributes:
-        scenario: The site.
+        scenario: The site, or a family of generated ones.
         engine: The engine of the training.
         reward: The reward.
         action: The action space.
+        envs: Number of environments in a batch, which shorten the rollouts of each.
     """
 
     scenario: str
     engine: str = "event"
     reward: str | Reward = "terminal"
     action: str = "dimensions"
+    envs: int = 1
 
     def environment(
         self, engine: Engine, realisations: int | None = None, cache: str | None = None
     ) -> BlastBarrierEnv:
-        """Return the environment with an engine."""
-        return BlastBarrierEnv(
-            self.scenario,
-            reward=self.reward,
-            observation="features",
-            action=self.action,
-            engine=engine,
-            realisations=realisations,
-            cache=BlastStore(cache, size=8192),
-        )
+        """Return the environment of the judgement, of a family on held-out sites."""
+        store = BlastStore(cache, size=8192)
+        return BlastBarrierEnv(**self._arguments(engine, "held_out", realisations), cache=store)
+
+    def learning(self, seed: int) -> gym.Env[Any, Any] | VecEnv:
+        """Return the environment of a training: noisy threats, and generated sites, are met again.
+
+        Of generated sites each environment of the batch has 64.
+        """
+        engine = self.training
+        arguments = self._arguments(engine, "training", 1)
+        if self.envs == 1:
+            env = BlastBarrierEnv(**arguments, cache=BlastStore(size=8192))
+            return ThreatPool(env, 128, seed) if engine.has_noise or self.family else env
+        batch = BlastBarrierVectorEnv(self.envs, "Disabled", **arguments)
+        again = range(self.envs) if self.family else ()
+        pools = [{"size": 64, "seed": self.envs * seed + index} for index in again]
+        return BatchVecEnv(batch, pools)
+
+    @property
+    def family(self) -> Ranges | None:
+        """The family of generated sites; `None` for a single one."""
+        return FAMILIES.get(self.scenario)
+
+    def _arguments(self, engine: Engine, sites: str, realisations: int | None) -> dict[str, Any]:
+        scenario: str | SiteSource = self.scenario
+        if self.family is not None:
+            scenario = getattr(SiteSource, sites)(ranges=self.family)
+        return {
+            "scenario": scenario,
+            "reward": self.reward,
+            "observation": "features",
+            "action": self.action,
+            "engine": engine,
+            "realisations": realisations,
+        }
 
     @cached_property
     def training(self) -> Engine:
@@ -100,11 +138,10 @@ class Curve(BaseCallback):
 def trained(
     algorithm: str, setting: Setting, steps: int, seed: int, curve: Curve | None = None
 ) -> Agent:
-    """Return an agent of the library's defaults; a noisy engine has 128 threats, met again."""
-    env: gym.Env[Any, Any] = setting.environment(setting.training, realisations=1)
-    if setting.training.has_noise:
-        env = ThreatPool(env, 128, seed)
-    agent: Agent = KNOWN[algorithm]("MlpPolicy", env, seed=seed, device="cpu")
+    """Return an agent of the library's defaults; several environments share a rollout's steps."""
+    shared: dict[str, Any] = {} if setting.envs == 1 else {"n_steps": ROLLOUT // setting.envs}
+    env = setting.learning(seed)
+    agent: Agent = KNOWN[algorithm]("MlpPolicy", env, seed=seed, device="cpu", **shared)
     agent.learn(steps, callback=curve)
     return agent
 
@@ -141,18 +178,30 @@ def _known(scenario: Scenario, charge: Charge) -> AnyCharge:
 
 
 def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield each rule with its reduction in each held-out episode."""
-    found: dict[str, list[float]] = {}
-    for seed in seeds:
+    """Yield each rule with its reduction in each held-out episode; without a layout it is 0."""
+    found: dict[str, FloatArray] = {}
+    for position, seed in enumerate(seeds):
         env.reset(seed=seed)
         scenario, finish = env.placement.scenario, env.placement.catalogue.finish
         (charge,) = env.step(finish)[-1]["charges"]
         for name, layout in layouts_by_rule(scenario, _known(scenario, charge)).items():
             env.reset(seed=seed, options={"layout": layout})
             *_, info = env.step(finish)
-            found.setdefault(name, []).append(info["reduction"])
-    for name, item in found.items():
-        yield name, np.array(item)
+            found.setdefault(name, np.zeros(len(seeds)))[position] = info["reduction"]
+    yield from found.items()
+
+
+def by_packaged_agent(env: BlastBarrierEnv, seeds: Sequence[int]) -> FloatArray:
+    """Return the reduction by the packaged agent's proposal in each held-out episode."""
+    agent, found = packaged_agent(), []
+    for seed in seeds:
+        env.reset(seed=seed)
+        scenario, finish = env.placement.scenario, env.placement.catalogue.finish
+        (charge,) = env.step(finish)[-1]["charges"]
+        layout = agent.propose(scenario, _known(scenario, charge))
+        env.reset(seed=seed, options={"layout": layout})
+        found.append(env.step(finish)[-1]["reduction"])
+    return np.array(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +229,12 @@ class Judgement:
         """The reductions by the rule of the largest mean."""
         return max(self.rules.values(), key=lambda rule: float(rule.mean()))
 
+    @cached_property
+    def best_of_each(self) -> FloatArray:
+        """The reductions by the best rule of each threat, which takes blasts of all to know."""
+        best: FloatArray = np.max([*self.rules.values()], axis=0)
+        return best
+
     def of(self, algorithm: str) -> FloatArray:
         """Return the reductions by the agents of an algorithm (agents, threats)."""
         named = (item for name, item in self.trained.items() if name.split(",")[0] == algorithm)
@@ -190,14 +245,17 @@ class Judgement:
         yield f"{self.site}, judged by {self.judge} on {len(self.random)} threats"
         for name, item in (*self.rules.items(), (RANDOM, self.random)):
             yield f"{name}: {_mean(item)}"
+        yield f"the best rule of each: {_mean(self.best_of_each)}"
         for name, item in (*self.others.items(), *self.trained.items()):
-            more, least, most = mean_estimate(item - self.best_rule).scaled(100.0)
-            lead = f"{more:+.1f} points on the best rule ({least:.1f} to {most:.1f})"
-            yield f"{name}: {_mean(item)}; {lead}"
+            leads = {"the best rule": self.best_rule, "the best rule of each": self.best_of_each}
+            shown = (f"{_lead(item - beside)} on {what}" for what, beside in leads.items())
+            yield f"{name}: {_mean(item)}; {'; '.join(shown)}"
 
     def row(self) -> tuple[str, ...]:
         """Return the row of the site in the table: means over threats and seeds, %."""
         cells = [self.site, self.judge, f"{100.0 * self.random.mean():.1f}"]
+        suggested = self.others.get(SUGGESTED)
+        cells.append("" if suggested is None else f"{100.0 * suggested.mean():.1f}")
         for algorithm, beside in zip(KNOWN, (self.random, self.best_rule), strict=True):
             found = self.of(algorithm)
             if algorithm == "MaskablePPO":
@@ -218,12 +276,18 @@ HEADERS: Final = (
     "site",
     "judged by",
     "random",
+    "random suggestions",
     "PPO",
     "its lead on random",
     "best rule",
     "MaskablePPO",
     "its lead on the best rule",
 )
+
+
+def _lead(of_episodes: FloatArray) -> str:
+    more, least, most = mean_estimate(of_episodes).scaled(100.0)
+    return f"{more:+.1f} points ({least:.1f} to {most:.1f})"
 
 
 def _mean(of_episodes: FloatArray) -> str:
@@ -244,6 +308,10 @@ def judged(
     others = {}
     if setting.action == "row":
         others["the nearest row again and again"] = reductions(env, 0, seeds)
+    if setting.action == "suggestion":
+        others[SUGGESTED] = reductions(env, None, seeds)
+    if setting.family is not None:
+        others["packaged agent"] = by_packaged_agent(flat, seeds)
     return Judgement(
         setting.scenario,
         engine.name,
@@ -260,11 +328,13 @@ def main(
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
     scenario: Annotated[
-        list[str] | None, typer.Option(help="The site, courtyard by default; may be given again.")
+        list[str] | None,
+        typer.Option(help="A site, courtyard by default, or a family; may be given again."),
     ] = None,
     engine: Annotated[str, typer.Option(help="Engine of the training.")] = "event",
     reward: Annotated[str, typer.Option(help="Reward.")] = "terminal",
     action: Annotated[str, typer.Option(help="Action space.")] = "dimensions",
+    envs: Annotated[int, typer.Option(help="Environments in a batch of the training.")] = 1,
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
     by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 12,
@@ -274,7 +344,7 @@ def main(
     torch.set_num_threads(1)
     rows, gas = [], find_engine("gas")
     for site in scenario or ["courtyard"]:
-        setting = Setting(site, engine, reward, action)
+        setting = Setting(site, engine, reward, action, envs)
         agents: dict[str, Agent] = {}
         for kind in algorithm or KNOWN:
             for seed in range(seeds):

@@ -1,8 +1,7 @@
 """Action spaces: an action is a placement, a part of it, or whose next piece to take."""
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -178,6 +177,10 @@ class Actions(Protocol):
         """Return how agents write the actions, of which there are `count`: as numbers."""
         return Numbers(count)
 
+    def suggestions(self, representative: Scenario) -> tuple[str, ...]:  # noqa: ARG002
+        """Return the rules behind the actions, by title, in their order: none."""
+        return ()
+
 
 @dataclass(frozen=True)
 class PlaceAtOnce(Actions):
@@ -265,6 +268,10 @@ class Suggested(PlaceAtOnce):
     def numbered(self, scenario: Scenario, representative: Scenario) -> NumberedActions:
         """Return the suggestions on a site."""
         return Suggestions.of(scenario, representative)
+
+    def suggestions(self, representative: Scenario) -> tuple[str, ...]:
+        """Return the rules that suit the representative scenario, by title."""
+        return tuple(row.title for row in Suggestions.of(representative, representative).rules)
 
 
 @dataclass(frozen=True)
@@ -519,9 +526,6 @@ class ActionNumbers:
 # ---- Suggestions.
 
 
-_MOST_CHARGES: Final = 64
-"""Most charges of a site for which the layouts of the rules are kept."""
-
 _NOTHING: Final = -1
 """In the place of an element's number: the layout has no further one."""
 
@@ -539,7 +543,6 @@ class Suggestions:
     scenario: Scenario
     rules: "tuple[RuleRow, ...]"
     charge: AnyCharge | None = None
-    _kept: "OrderedDict[AnyCharge, Suggestions]" = field(default_factory=OrderedDict, repr=False)
 
     @classmethod
     def of(cls, scenario: Scenario, representative: Scenario) -> "Suggestions":
@@ -558,14 +561,7 @@ class Suggestions:
     def with_sources(self, sources: tuple[AnySource, ...]) -> "Suggestions":
         """Return the suggestions where an agent is shown a single charge, or all of them."""
         charge = _shown_charge(self.scenario, sources)
-        if charge is None:
-            return self
-        found = self._kept.get(charge)
-        if found is None:
-            found = self._kept[charge] = Suggestions(self.scenario, self.rules, charge)
-            if len(self._kept) > _MOST_CHARGES:
-                self._kept.popitem(last=False)
-        return found
+        return self if charge is None else Suggestions(self.scenario, self.rules, charge)
 
     @cached_property
     def numbers(self) -> IntArray:
@@ -573,7 +569,9 @@ class Suggestions:
 
         A rule without a layout has no element.
         """
-        layouts = [rule.layout(self.scenario, self.charge) or () for rule in self.rules]
+        from blast_env.rules import ById, layouts_for  # as in `of`
+
+        layouts = layouts_for(ById(self.scenario), self.rules, self.charge)
         numbers = np.full((len(layouts), max(map(len, layouts), default=0) or 1), _NOTHING)
         for row, layout in zip(numbers, layouts, strict=True):
             row[: len(layout)] = [self.scenario.zone.catalogue.action(item) for item in layout]

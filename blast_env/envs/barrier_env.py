@@ -217,6 +217,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
         if isinstance(self.observation_space, spaces.Dict):
             mask = spaces.MultiBinary(spaces.flatdim(self.action_space))
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
+        elif self.task.shows_suggestions:
+            self.observation_space = _with_suggestions(self.observation_space, self.suggestions)
         self._display: Display | None = None
         if render_mode is not None:
             self._display = _display(render_mode, self.metadata["render_fps"])
@@ -271,6 +273,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
     def finish(self) -> Any:
         """The action that finishes."""
         return self.episodes.code.finish
+
+    @property
+    def suggestions(self) -> tuple[str, ...]:
+        """The rules behind the actions of `"suggestion"`, in their order; none of other spaces."""
+        return self.task.suggestions
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (length,); see `ActionCode.masks`.
@@ -332,6 +339,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
         if not self.episodes.running:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
         return self.episodes.running[0]
+
+
+def _with_suggestions(space: spaces.Space[Any], suggestions: Sequence[str]) -> spaces.Box:
+    """Return the space of a vector with a value from 0 to 1 more for each suggestion."""
+    assert space.shape is not None
+    return spaces.Box(0.0, 1.0, (space.shape[0] + len(suggestions),), np.float32)
 
 
 def _display(render_mode: str, frames_per_s: int) -> "Display":

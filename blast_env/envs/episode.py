@@ -21,6 +21,7 @@ from blast_env.envs.observable import (
     Observable,
     Observation,
 )
+from blast_env.envs.observations import FeaturesObservation
 from blast_env.envs.strategies import (
     EndReward,
     HiddenThreat,
@@ -107,6 +108,16 @@ class Task:
     engine: Engine
     store: BlastStore
     counts: BlastCounts = field(default_factory=BlastCounts)
+
+    @cached_property
+    def suggestions(self) -> tuple[str, ...]:
+        """The rules behind the actions, by title, in their order; none of other action spaces."""
+        return self.actions.suggestions(self.source.representative)
+
+    @cached_property
+    def shows_suggestions(self) -> bool:
+        """Whether the vector `"features"` goes on with the mask of the suggestions."""
+        return isinstance(self.observation, FeaturesObservation) and bool(self.suggestions)
 
     def case(
         self,
@@ -619,6 +630,9 @@ class Episodes:
         observed = kind.observe_many(observations, self.layouts.placements(indices, possible))
         if isinstance(space, spaces.Dict):
             observed |= {MASK: self.masks(indices)}
+        elif self.task.shows_suggestions:
+            legal = self.masks(indices)[:, :-1].astype(observed.dtype)
+            observed = np.concatenate((observed, legal), axis=1)
         return observed
 
     def _observed(self, index: int) -> Any:

@@ -1,7 +1,7 @@
 """Rules of thumb, which place by the site alone, and the table of them."""
 
-from blast_env.rules.posts import line_of_posts, posts_and_wall
-from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule
+from blast_env.rules.posts import ById, line_of_posts, posts_and_wall
+from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule, layouts_for
 from blast_env.rules.walls import (
     NEAR_BUILDING,
     NEAR_CHARGE,
@@ -22,6 +22,7 @@ __all__ = [
     "NEAR_BUILDING",
     "NEAR_CHARGE",
     "RULES",
+    "ById",
     "Need",
     "Rule",
     "RuleRow",
@@ -29,6 +30,7 @@ __all__ = [
     "hardening_alone",
     "hardening_and_sight_lines",
     "layouts_by_rule",
+    "layouts_for",
     "line_of_posts",
     "line_of_sight_wall",
     "posts_and_wall",

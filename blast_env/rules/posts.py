@@ -47,7 +47,7 @@ def line_of_posts(
     Raises:
         BlastEnvError: If the scenario has no build zone or no vehicle.
     """
-    return _line_on(_ById(find_scenario(scenario))).layout
+    return _line_on(ById(find_scenario(scenario))).layout
 
 
 def posts_and_wall(
@@ -67,7 +67,7 @@ def posts_and_wall(
         BlastEnvError: As for `line_of_posts`.
     """
     found = find_scenario(scenario)
-    posts = _line_on(_ById(found))
+    posts = _line_on(ById(found))
     source = min(
         found.vehicles, key=lambda vehicle: _Vehicles.scaled_m(found, vehicle, posts.layout)
     )
@@ -76,20 +76,20 @@ def posts_and_wall(
 
 
 @dataclass(frozen=True, eq=False)
-class _ById:
+class ById:
     """A scenario as a cache key, compared by identity, because comparison by value is slow."""
 
     scenario: Scenario
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ById) and other.scenario is self.scenario
+        return isinstance(other, ById) and other.scenario is self.scenario
 
     def __hash__(self) -> int:
         return id(self.scenario)
 
 
 @lru_cache(maxsize=4)
-def _line_on(very: _ById) -> LayoutState:
+def _line_on(very: ById) -> LayoutState:
     """Return the line of posts of a scenario, cached for the two rules that need it."""
     scenario = very.scenario
     scenario.zone  # noqa: B018  # refuses a scenario without one

@@ -52,10 +52,31 @@ def test_a_row_of_the_table_has_leads_over_random_and_over_the_best_rule() -> No
     trained = {"PPO, seed 0, 1 CPU s": two, "PPO, seed 1, 1 CPU s": one}
     found = Judgement("courtyard", "gas", {"a": one, "b": two}, np.zeros(2), trained)
     assert found.row() == (
-        *("courtyard", "gas", "0.0"),
+        *("courtyard", "gas", "0.0", ""),
         *("25.0 (20.0 to 30.0)", "+25.0"),
         *("30.0", "", ""),
     )
+
+
+def test_leads_are_on_the_best_rule_of_all_and_of_each() -> None:
+    one, two = np.array([0.1, 0.3]), np.array([0.4, 0.2])
+    found = Judgement("item_sites", "gas", {"a": one, "b": two}, np.zeros(2), {"PPO, seed 0": two})
+    assert found.best_of_each.tolist() == [0.4, 0.3]
+    *_, line = found.lines()
+    assert "+0.0 points (0.0 to 0.0) on the best rule; -5.0 points" in line
+
+
+def test_a_family_is_learnt_on_its_training_sites_and_judged_on_held_out_ones() -> None:
+    setting = Setting("item_sites", "surrogate", action="suggestion", envs=2)
+    envs = setting.learning(seed=0)
+    held_out = setting.environment(ShadeEngine())
+    assert (envs.action_space, envs.observation_space) == (
+        held_out.action_space,
+        held_out.observation_space,
+    )
+    learnt = envs.envs.one.task.source  # type: ignore[union-attr]
+    judged = held_out.task.source
+    assert judged.first_seed + judged.count <= learnt.first_seed  # type: ignore[attr-defined]
 
 
 def test_rules_know_a_vehicle_that_goes_to_the_worst_place_left() -> None:
