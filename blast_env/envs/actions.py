@@ -26,7 +26,7 @@ from blast_env.units import MODULE_SIDE_M
 from blast_env.values import whole_number
 
 if TYPE_CHECKING:
-    from blast_env.rules import RuleRow
+    from blast_env.rules import Proposals, RuleRow
 
 
 class ActionCode(Protocol):
@@ -526,8 +526,16 @@ class ActionNumbers:
 # ---- Suggestions.
 
 
-_NOTHING: Final = -1
-"""In the place of an element's number: the layout has no further one."""
+SUGGESTION: Final = (
+    "has a next piece",
+    "pieces placed / pieces of its layout",
+    "lines of sight that its layout cuts / all",
+    "next piece: cost / budget",
+    "next piece: height / 12 m",
+    "next piece: distance along the line of sight / its length",
+    "next piece: distance to the left of that line / 20 m + 0.5",
+)
+"""The values of a suggestion, from 0 to 1; those of the next piece are 0 without one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -555,8 +563,7 @@ class Suggestions:
         """
         from blast_env.rules import RULES  # only where they are asked for
 
-        rules = tuple(row for row in RULES.values() if row.suits(representative))
-        return cls(scenario, rules)
+        return cls(scenario, tuple(row for row in RULES.values() if row.suits(representative)))
 
     def with_sources(self, sources: tuple[AnySource, ...]) -> "Suggestions":
         """Return the suggestions where an agent is shown a single charge, or all of them."""
@@ -564,18 +571,11 @@ class Suggestions:
         return self if charge is None else Suggestions(self.scenario, self.rules, charge)
 
     @cached_property
-    def numbers(self) -> IntArray:
-        """Numbers in the catalogue of each layout's elements in their order, then -1 (rules, most).
+    def proposals(self) -> "Proposals":
+        """What the rules propose."""
+        from blast_env.rules import ById, proposals_for  # as in `of`
 
-        A rule without a layout has no element.
-        """
-        from blast_env.rules import ById, layouts_for  # as in `of`
-
-        layouts = layouts_for(ById(self.scenario), self.rules, self.charge)
-        numbers = np.full((len(layouts), max(map(len, layouts), default=0) or 1), _NOTHING)
-        for row, layout in zip(numbers, layouts, strict=True):
-            row[: len(layout)] = [self.scenario.zone.catalogue.action(item) for item in layout]
-        return numbers
+        return proposals_for(ById(self.scenario), self.rules, self.charge)
 
     @property
     def finish(self) -> int:
@@ -599,15 +599,32 @@ class Suggestions:
         A piece that is placed is not legal again.
         """
         legal = self._legal(chosen)[action]
-        return int(self.numbers[action, legal.argmax()]) if legal.any() else None
+        return int(self.proposals.numbers[action, legal.argmax()]) if legal.any() else None
 
     def nearest(self, chosen: ActionChoice, action: int) -> int:  # noqa: ARG002
         """Return to finish: a rule whose layout is complete has had its say."""
         return self.finish
 
+    def values(self, chosen: ActionChoice, table: NDArray[np.int8]) -> FloatArray:
+        """Return the values `SUGGESTION` of each suggestion, from 0 to 1 (rules, values).
+
+        Args:
+            chosen: The choices so far.
+            table: 1 where a variant has its lower left cell (variants, rows, columns).
+        """
+        proposals, legal = self.proposals, self._legal(chosen)
+        has_next: BoolArray = np.any(legal, axis=1)
+        placed = (table.ravel()[proposals.numbers] > 0) & proposals.are_there
+        shares = placed.sum(axis=1) / np.maximum(proposals.are_there.sum(axis=1), 1)
+        following = proposals.pieces[np.arange(self.finish), legal.argmax(axis=1)]
+        following = following * has_next[:, np.newaxis]
+        of_rules = np.stack((has_next, shares, proposals.cut_shares), axis=1)
+        return np.concatenate((of_rules, following), axis=1)
+
     def _legal(self, chosen: ActionChoice) -> BoolArray:
         """Return which elements of each layout are legal now (rules, most)."""
-        legal: BoolArray = chosen.possible.ravel()[self.numbers] & (self.numbers != _NOTHING)
+        possible = chosen.possible.ravel()[self.proposals.numbers]
+        legal: BoolArray = possible & self.proposals.are_there
         return legal
 
 

@@ -10,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.arrays import IntArray
-from blast_env.envs.actions import ACTIONS, Actions
+from blast_env.envs.actions import ACTIONS, SUGGESTION, Actions
 from blast_env.envs.arguments import (
     PlainSpec,
     ResetOptions,
@@ -218,7 +218,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
             mask = spaces.MultiBinary(spaces.flatdim(self.action_space))
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
         elif self.task.shows_suggestions:
-            self.observation_space = _with_suggestions(self.observation_space, self.suggestions)
+            count = len(self.suggestions) * len(SUGGESTION)
+            self.observation_space = _longer(self.observation_space, count)
         self._display: Display | None = None
         if render_mode is not None:
             self._display = _display(render_mode, self.metadata["render_fps"])
@@ -341,10 +342,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
         return self.episodes.running[0]
 
 
-def _with_suggestions(space: spaces.Space[Any], suggestions: Sequence[str]) -> spaces.Box:
-    """Return the space of a vector with a value from 0 to 1 more for each suggestion."""
-    assert space.shape is not None
-    return spaces.Box(0.0, 1.0, (space.shape[0] + len(suggestions),), np.float32)
+def _longer(vectors: spaces.Space[Any], count: int) -> spaces.Box:
+    """Return the space of vectors that go on with some more values from 0 to 1."""
+    assert vectors.shape is not None
+    return spaces.Box(0.0, 1.0, (vectors.shape[0] + count,), np.float32)
 
 
 def _display(render_mode: str, frames_per_s: int) -> "Display":

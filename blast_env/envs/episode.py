@@ -12,7 +12,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
+from blast_env.envs.actions import ActionChoice, Actions, NumberedActions, Suggestions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observable import (
     MASK,
@@ -116,7 +116,7 @@ class Task:
 
     @cached_property
     def shows_suggestions(self) -> bool:
-        """Whether the vector `"features"` goes on with the mask of the suggestions."""
+        """Whether the vector `"features"` goes on with the values of suggestions."""
         return isinstance(self.observation, FeaturesObservation) and bool(self.suggestions)
 
     def case(
@@ -631,9 +631,15 @@ class Episodes:
         if isinstance(space, spaces.Dict):
             observed |= {MASK: self.masks(indices)}
         elif self.task.shows_suggestions:
-            legal = self.masks(indices)[:, :-1].astype(observed.dtype)
-            observed = np.concatenate((observed, legal), axis=1)
+            values = np.stack([self._suggested(index) for index in indices])
+            observed = np.concatenate((observed, values), axis=1, dtype=observed.dtype)
         return observed
+
+    def _suggested(self, index: int) -> FloatArray:
+        """Return the values of the suggestions in an episode, one suggestion after the other."""
+        suggestions = self.running[index].shown.actions
+        assert isinstance(suggestions, Suggestions)
+        return suggestions.values(self._choice(index), self.layouts.table[index]).ravel()
 
     def _observed(self, index: int) -> Any:
         episode = self.running[index]

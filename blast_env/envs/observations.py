@@ -78,7 +78,22 @@ class FeaturesObservation:
     for those drawn among others with a vehicle, one more value comes last: the stand-off of the
     vehicle with the modules placed so far, as a share of the site's diagonal; 1 without a vehicle.
 
-    `OBSERVATIONS["features"].names(scenario)` names each value.
+    With `action="suggestion"` the environment adds seven values for each suggestion, one after the
+    other (`env.unwrapped.suggestions` names them). Those of the next piece are 0 without one:
+
+    | from | values |
+    |---|---|
+    | 0 | 1 where it has a next piece |
+    | 1 | pieces placed / pieces of its layout |
+    | 2 | lines of sight that its whole layout cuts / all of them, by weight |
+    | 3 | cost of the next piece / budget (or the dearest element's cost), at most 1 |
+    | 4 | height of the next piece / 12 m, at most 1 |
+    | 5 | distance of the next piece from the charge along the line of sight / its length |
+    | 6 | distance of the next piece to the left of that line / 20 m + 0.5 |
+
+    The line of sight leads from the (mean) place of the charge to the middle of what is protected.
+
+    `OBSERVATIONS["features"].names(scenario)` names each value before these.
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:

@@ -1,7 +1,8 @@
 """Rules of thumb, which place by the site alone, and the table of them."""
 
 from blast_env.rules.posts import ById, line_of_posts, posts_and_wall
-from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule, layouts_for
+from blast_env.rules.proposals import Proposals, proposals_for
+from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule
 from blast_env.rules.walls import (
     NEAR_BUILDING,
     NEAR_CHARGE,
@@ -24,16 +25,17 @@ __all__ = [
     "RULES",
     "ById",
     "Need",
+    "Proposals",
     "Rule",
     "RuleRow",
     "expected_charge",
     "hardening_alone",
     "hardening_and_sight_lines",
     "layouts_by_rule",
-    "layouts_for",
     "line_of_posts",
     "line_of_sight_wall",
     "posts_and_wall",
+    "proposals_for",
     "random_element",
     "random_layout",
     "ring_around_building",

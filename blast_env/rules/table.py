@@ -6,14 +6,12 @@ A new rule is a function and a line of `RULES`: search, benchmark, page and envi
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
 from blast_env.rules import posts, walls
-from blast_env.rules.posts import ById
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 
 Rule = Callable[[AnyScenario, AnyCharge | None], Layout]
@@ -107,20 +105,6 @@ RULES: Final[Mapping[str, RuleRow]] = MappingProxyType(
     }
 )
 """The rules of the package, by name."""
-
-
-@lru_cache(maxsize=512)
-def layouts_for(
-    site: ById, rules: tuple[RuleRow, ...], charge: AnyCharge | None
-) -> tuple[Layout, ...]:
-    """Return the layouts of rules, in their order of placement; those of the last cases are kept.
-
-    Args:
-        site: The scenario; it has a build zone.
-        rules: The rules; one that has no layout for the scenario places nothing.
-        charge: The charge, if it is known.
-    """
-    return tuple(rule.layout(site.scenario, charge) or () for rule in rules)
 
 
 def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> dict[str, Layout]:

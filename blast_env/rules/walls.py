@@ -259,8 +259,14 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """
     found = find_scenario(scenario)
     # The lines are those of the known charge; the legal places keep off all possible ones.
-    seen = found if charge is None else found.model_copy(update={"charge": (source_of(charge),)})
-    return visibility_layout(found, Visibility.of(seen))
+    return visibility_layout(found, Visibility.of(seen_with(found, charge)))
+
+
+def seen_with(scenario: Scenario, charge: AnyCharge | None) -> Scenario:
+    """Return the scenario with a known charge as its only source; unchanged for `None`."""
+    if charge is None:
+        return scenario
+    return scenario.model_copy(update={"charge": (source_of(charge),)})
 
 
 def hardening_alone(scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:  # noqa: ARG001
@@ -368,7 +374,7 @@ class _View:
         x_m, y_m = scenario.zone.centres_m
         # Coordinates along the line of sight (depth) and across it (aside), of the centres of
         # cells, then of pieces by the offset from their lower left cell.
-        along_x, along_y, _ = _line_of_sight(scenario, charge_m)
+        along_x, along_y, _ = line_of_sight(scenario, charge_m)
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
         between = placement.usable & _between(scenario, charge_m)
         aside_m = (y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y
@@ -433,7 +439,7 @@ class _View:
         return _End(end.side, reach_m, abs(float(self.depth_m[place]) - wall_m))
 
 
-def _line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, float]:
+def line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, float]:
     """Return the direction from a charge to the middle of what is protected; its length, m."""
     target_x_m, target_y_m = _protected_middle_m(scenario)
     along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
@@ -449,7 +455,7 @@ def _line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, 
 def _between(scenario: Scenario, charge_m: PointM) -> BoolArray:
     """Return the cells, usable or not, between a charge and the protected structures."""
     x_m, y_m = scenario.zone.centres_m
-    along_x, along_y, distance_m = _line_of_sight(scenario, charge_m)
+    along_x, along_y, distance_m = line_of_sight(scenario, charge_m)
     depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
     between: BoolArray = (depth_m > 0.0) & (depth_m < distance_m)
     for structure in scenario.structures:

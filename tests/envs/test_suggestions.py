@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sb3_contrib import MaskablePPO
 
+from blast_env.envs.actions import SUGGESTION
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
@@ -25,23 +26,24 @@ from blast_env.site import (
 )
 from blast_env.sites import ItemSiteRanges, SiteSource
 from tests.catalogue_sites import yard
-from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
+from tests.envs.small import ThinEngine, restricted_scenario, same, small_document, small_scenario
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
 SITES: Final = ("courtyard", "control_room", "hotel_forecourt")
 """Modules, a catalogue, a catalogue and vehicles."""
 
+ALONG: Final = "next piece: distance along the line of sight / its length"
+
 
 def suggesting(scenario: Any, **arguments: Any) -> BlastBarrierEnv:
     defaults: dict[str, Any] = {
+        "action": "suggestion",
         "observation": "features",
         "engine": ShadeEngine(),
         "realisations": 1,
     }
-    env = gym.make(
-        "BlastBarrier-v0", scenario=scenario, action="suggestion", **(defaults | arguments)
-    ).unwrapped
+    env = gym.make("BlastBarrier-v0", scenario=scenario, **(defaults | arguments)).unwrapped
     assert isinstance(env, BlastBarrierEnv)
     return env
 
@@ -239,3 +241,55 @@ def test_the_space_comes_with_two_objectives() -> None:
     _, reward, _, _, _ = env.step(0)
     assert reward.shape == (2,)
     assert reward[1] < 0.0  # the cost of the piece
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_the_vector_goes_on_with_seven_values_of_each_suggestion(name: str) -> None:
+    env, plain = suggesting(name), suggesting(name, action="place")
+    vector, _ = env.reset(seed=3)
+    others, _ = plain.reset(seed=3)
+    count = len(env.suggestions)
+    assert same(vector[: len(others)], others)
+    assert vector in env.observation_space
+    values = vector[len(others) :].reshape(count, len(SUGGESTION))
+    assert (values[:, 0] == env.action_masks()[:-1]).all()
+    # 1. A layout of two pieces or more, piece by piece: its share rises, the others' may as well.
+    action = env.suggestions.index(RULES["wall_near_charge"].title)
+    layout = proposed(env, RULES["wall_near_charge"], shown(env))
+    for piece in range(len(layout)):
+        assert values[action, 1] == pytest.approx(piece / len(layout))
+        vector, *_ = env.step(action)
+        values = vector[len(others) :].reshape(count, len(SUGGESTION))
+    # 2. Walls near the charge stand before those near the building.
+    vector, _ = env.reset(seed=3)
+    values = vector[len(others) :].reshape(count, len(SUGGESTION))
+    along = [
+        values[env.suggestions.index(RULES[rule].title), SUGGESTION.index(ALONG)]
+        for rule in ("wall_near_charge", "wall_in_middle", "wall_near_building")
+    ]
+    assert 0.0 < along[0] < along[1] < along[2] < 1.0
+
+
+def test_a_mean_charge_in_the_middle_of_what_is_protected_has_no_line_of_sight() -> None:
+    """Rules propose nothing then, and the values are numbers all the same."""
+    document = small_document()
+    around = [
+        {**document["charge"][1], "position_m": place, "weight": 1.0}
+        for place in ((10.0, 1.0), (18.0, 1.0), (10.0, 17.0), (18.0, 17.0))
+    ]
+    house = {**document["structures"][1], "corner_m": (13.0, 6.0), "rows": 12, "columns": 4}
+    found = Scenario.model_validate(document | {"charge": around, "structures": [house]})
+    env = suggesting(found, engine=ThinEngine(), threat="hidden", threats=2)
+    vector, info = env.reset(seed=0)
+    assert vector in env.observation_space
+    assert not info["action_mask"][:3].any()
+
+
+def test_only_suggestions_have_names() -> None:
+    assert suggesting("courtyard").suggestions == (
+        "wall near the charge",
+        "wall in the middle",
+        "wall near the building",
+        "most sight lines cut",
+    )
+    assert suggesting("courtyard", action="place").suggestions == ()
