@@ -81,15 +81,13 @@ class FeaturesObservation:
     With `action="suggestion"` the environment adds seven values for each suggestion, one after the
     other (`env.unwrapped.suggestions` names them). Those of the next piece are 0 without one:
 
-    | from | values |
-    |---|---|
-    | 0 | 1 where it has a next piece |
-    | 1 | pieces placed / pieces of its layout |
-    | 2 | lines of sight that its whole layout cuts / all of them, by weight |
-    | 3 | cost of the next piece / budget (or the dearest element's cost), at most 1 |
-    | 4 | height of the next piece / 12 m, at most 1 |
-    | 5 | distance of the next piece from the charge along the line of sight / its length |
-    | 6 | distance of the next piece to the left of that line / 20 m + 0.5 |
+    1. has a next piece (1 or 0)
+    2. pieces placed / pieces of its layout
+    3. lines of sight that its layout cuts / all (by weight)
+    4. next piece: cost / budget (or / the dearest element's cost)
+    5. next piece: height / 12 m
+    6. next piece: distance along the line of sight / its length (0 at the charge)
+    7. next piece: distance to the left of that line / 20 m + 0.5
 
     The line of sight leads from the (mean) place of the charge to the middle of what is protected.
 

@@ -12,6 +12,7 @@ from sb3_contrib import MaskablePPO
 
 from blast_env.envs.actions import SUGGESTION
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import FeaturesObservation
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
 from blast_env.rules import RULES, RuleRow
@@ -283,6 +284,12 @@ def test_a_mean_charge_in_the_middle_of_what_is_protected_has_no_line_of_sight()
     vector, info = env.reset(seed=0)
     assert vector in env.observation_space
     assert not info["action_mask"][:3].any()
+
+
+def test_the_page_has_each_value_by_name() -> None:
+    text = FeaturesObservation.__doc__ or ""
+    for number, name in enumerate(SUGGESTION, 1):
+        assert f"\n    {number}. {name}" in text
 
 
 def test_only_suggestions_have_names() -> None:
