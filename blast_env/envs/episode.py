@@ -41,7 +41,7 @@ from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.batch import LayoutBatch, PlacementRules
 from blast_env.layout.placement import LegalLayout
-from blast_env.site import AnyCharge, Scenario
+from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
@@ -151,6 +151,12 @@ class _Shown:
     actions: NumberedActions
     charges: tuple[AnyCharge, ...]
     case: LoadCaseSet | None
+
+    @cached_property
+    def vehicles(self) -> tuple[VehicleSource, ...]:
+        """The vehicles that bring the charges."""
+        sources = [item.source for item in self.charges if isinstance(item, VehicleCharge)]
+        return tuple({id(source): source for source in sources}.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -477,8 +483,10 @@ class Episodes:
         ended = stops | layouts.is_full[rows]
         self.ended[rows] = ended
         self._ended_now = chosen[ended].tolist()
-        for index in self._ended_now:
-            self.running[index].final = layouts.checked(index)
+        vehicles = [self.running[index].shown.vehicles for index in self._ended_now]
+        finals = layouts.checked_against(self._ended_now, vehicles)
+        for index, final in zip(self._ended_now, finals, strict=True):
+            self.running[index].final = final
         if self._of_turns is not None:
             self._turns = {index: self._turn(index) for index in indices}
 
@@ -486,8 +494,9 @@ class Episodes:
         """Return the last turn of an episode."""
         episode, before = self.running[index], int(self._before[index])
         after = self.layouts.checked(index)
-        earlier = LegalLayout(after[:before]) if before < len(after) else after
-        earlier.scenario = after.scenario
+        earlier = after
+        if before < len(after):
+            earlier = LegalLayout.of(after.scenario, after[:before])
         ends = bool(self._begins[index]), bool(self.ended[index])
         objective = episode.site.empty.scenario.objective
         return Transition(objective, episode.initial, earlier, after, *ends)

@@ -16,7 +16,7 @@ from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
-from blast_env.layout.placement import load_relevant
+from blast_env.layout.placement import LegalLayout, load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.response.levels import LevelOfProtection
@@ -224,10 +224,11 @@ class BlastEvaluator:
 
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
-        cells = tuple(sorted(load_relevant(check_layout(self.scenario, layout))))
+        legal = check_layout(self.scenario, layout)
+        cells = tuple(sorted(load_relevant(legal)))
         # Without noise the seed has no effect: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
-        charge = threat.charge_against(self.scenario, cells)
+        charge = threat.charge_against(self.scenario, legal)
         site, *_, engine, calibration, code, parts = self._key_of_nothing
         return BlastKey(site, cells, charge, seed, engine, calibration, code, parts)
 
@@ -281,7 +282,8 @@ def loads_together(
         known = evaluator.store.get(key, evaluator.scenario)
         if known is None:
             # The charge, or the vehicle that carries it to the place in the key.
-            blast = EngineBlast(evaluator.scenario, key.layout, threat.charge, key.seed)
+            cells = layout.in_order(key.layout) if isinstance(layout, LegalLayout) else key.layout
+            blast = EngineBlast(evaluator.scenario, cells, threat.charge, key.seed)
             missing[number] = key, evaluator, blast
         else:
             found[number] = known

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.geometry import Element, Layout
 from blast_env.layout.placement import LayoutState, LegalLayout
+from blast_env.site import VehicleSource
 from blast_env.site.catalogue import Catalogue
 from blast_env.site.models import Scenario
 from blast_env.site.zone import BuildZone
@@ -203,9 +204,35 @@ class LayoutBatch:
 
     def checked(self, index: int) -> LegalLayout:
         """Return the same, marked as checked by its rules."""
-        layout = LegalLayout(self.elements(index))
-        layout.scenario = self.rules[index].scenario
-        return layout
+        return LegalLayout.of(self.rules[index].scenario, self.elements(index))
+
+    def checked_against(
+        self, indices: Sequence[int], vehicles: Sequence[Sequence[VehicleSource]]
+    ) -> list[LegalLayout]:
+        """Return the same of several layouts, with the worst places of vehicles on plain ground.
+
+        Args:
+            indices: The layouts.
+            vehicles: The vehicles that may come to each of them.
+        """
+        found = {index: self.checked(index) for index in indices}
+        # Places of a vehicle against all layouts on its site are found at once.
+        groups: dict[tuple[int, int], tuple[VehicleSource, list[int]]] = {}
+        for index, of_layout in zip(indices, vehicles, strict=True):
+            for source in of_layout:
+                key = id(self.rules[index]), id(source)
+                groups.setdefault(key, (source, []))[1].append(index)
+        for source, own in groups.values():
+            rules = self.rules[own[0]]
+            ground = rules.scenario.vehicle_ground(source).plain
+            if ground is None or rules.zone.removable:
+                continue
+            arrays = rules.obstacles.boxes_m, rules.obstacles.kinds, self._numbers[own]
+            places = ground.worst_of_many(*arrays, self.placed[own])
+            for index, worst in zip(own, places, strict=True):
+                if worst is not None:
+                    found[index].worst[id(source)] = worst
+        return list(found.values())
 
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""

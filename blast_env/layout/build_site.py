@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blast_env.geometry import Element, Layout, standing
-from blast_env.layout.placement import LayoutState, check_layout, usable_cells
+from blast_env.layout.placement import LayoutState, LegalLayout, check_layout, usable_cells
 from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
@@ -56,7 +56,13 @@ def worst_places(
     Args:
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
     """
-    return scenario.vehicle_ground(source, layout).worst_places(_obstacles(scenario, layout))
+    is_checked = isinstance(layout, LegalLayout) and layout.scenario is scenario
+    known = layout.worst if is_checked else {}
+    found = known.get(id(source))
+    if found is None or found.source is not source:
+        ground = scenario.vehicle_ground(source, layout)
+        found = known[id(source)] = ground.worst_places(_obstacles(scenario, layout))
+    return found
 
 
 def vehicle_reach(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import fsum
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,40 @@ from blast_env.site.zone import (
 )
 from blast_env.vehicles.access_way import closing_places, is_open
 
+if TYPE_CHECKING:  # most sites have no vehicle
+    from blast_env.vehicles.worst_places import WorstPlaces
+
 
 class LegalLayout(tuple[Element, ...]):
     """A layout that was checked against all conditions of a build zone.
 
-    It equals the plain tuple; see `LayoutState.checked`.
+    It equals the plain tuple, and is one on its way to other processes.
+
+    Attributes:
+        scenario: The scenario.
+        worst: The worst places of vehicles against it as far as they are known, by the identity of
+            the vehicle, which they have; see `worst_places`.
     """
 
     scenario: Scenario
+    worst: "dict[int, WorstPlaces]"
+
+    @classmethod
+    def of(cls, scenario: Scenario, elements: Iterable[Element]) -> Self:
+        """Return a layout of elements that were checked."""
+        layout = cls(elements)
+        layout.scenario, layout.worst = scenario, {}
+        return layout
+
+    def in_order(self, elements: Iterable[Element]) -> Self:
+        """Return the same elements in another order, or without what vehicles do not meet."""
+        layout = self.of(self.scenario, elements)
+        layout.worst = self.worst
+        return layout
+
+    def __reduce__(self) -> tuple[type[Layout], tuple[Layout]]:
+        """Pickle the plain tuple."""
+        return tuple, (tuple(self),)
 
 
 @dataclass(frozen=True)
@@ -83,9 +109,7 @@ class LayoutState:
     @cached_property
     def checked(self) -> LegalLayout:
         """The layout, marked as checked by `of` and `place`."""
-        layout = LegalLayout(self.layout)
-        layout.scenario = self.scenario
-        return layout
+        return LegalLayout.of(self.scenario, self.layout)
 
     def place(self, element: Element) -> "LayoutState":
         """Return the placement with one more module or piece.

@@ -1,6 +1,6 @@
 """The choice of the worst places of a vehicle's charge, in compiled code."""
 
-from math import hypot, inf, nan, sqrt
+from math import hypot, inf, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -163,7 +163,7 @@ def worst_against(
 
 
 @compiled(nogil=True, error_model="numpy")
-def put_stand_offs(
+def put_worst(
     boxes_m: FloatArray,
     kinds: Any,
     layouts: IntArray,
@@ -181,9 +181,34 @@ def put_stand_offs(
     middles_m: FloatArray,
     least_apart_m: float,
     equal_m: float,
-    found: FloatArray,
+    places_m: FloatArray,
+    distances_m: FloatArray,
+    found: IntArray,
 ) -> None:
-    """Put the distance of the worst place behind each layout; see `PlainGround.stand_offs_m`."""
+    """Put the worst places behind each layout, and their number; see `PlainGround.worst_of_many`.
+
+    Args:
+        boxes_m: See `PlainGround.worst_of_many`.
+        kinds: The same.
+        layouts: The same.
+        counts: The same.
+        always: See `worst_against`, as the further ones up to `equal_m`.
+        never: The same.
+        starts: The same.
+        half: The same.
+        cuts_x: The same.
+        places_x: The same.
+        cuts_y: The same.
+        places_y: The same.
+        per_m: The same.
+        walls_m: The same.
+        middles_m: The same.
+        least_apart_m: The same.
+        equal_m: The same.
+        places_m: The places, as many as there is room for (layouts, most, 2).
+        distances_m: Their distances (layouts, most).
+        found: How many there are; 0 where an element has its own rules (layouts,).
+    """
     for layout in range(len(layouts)):
         more_m = np.empty((counts[layout], 4))
         after = stops = 0
@@ -197,9 +222,9 @@ def put_stand_offs(
                         more_m[after, side] = boxes_m[number, side]
                     after += 1
             stops = after if kind == STOPS else stops
-        found[layout] = nan
+        found[layout] = 0
         if is_plain:
-            _, distances_m = worst_against(
+            chosen_m, of_chosen_m = worst_against(
                 always,
                 never,
                 starts,
@@ -213,12 +238,15 @@ def put_stand_offs(
                 per_m,
                 walls_m,
                 middles_m,
-                1,
+                distances_m.shape[1],
                 least_apart_m,
                 equal_m,
             )
-            if len(distances_m):
-                found[layout] = distances_m[0]
+            found[layout] = len(of_chosen_m)
+            for rank in range(len(of_chosen_m)):
+                distances_m[layout, rank] = of_chosen_m[rank]
+                places_m[layout, rank, 0] = chosen_m[rank, 0]
+                places_m[layout, rank, 1] = chosen_m[rank, 1]
 
 
 @njit(error_model="numpy")

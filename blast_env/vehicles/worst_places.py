@@ -149,7 +149,22 @@ class PlainGround:
     ) -> FloatArray:
         """Return the stand-off behind each of several layouts, m (layouts,).
 
-        It is NaN where there are no places, or an element has its own rules.
+        It is NaN where there are no places, or an element has its own rules. Arguments are those of
+        `worst_of_many`.
+        """
+        _, distances_m, found = self._behind(boxes_m, kinds, layouts, counts, 1)
+        return np.where(found, distances_m[:, 0], np.nan)
+
+    def worst_of_many(
+        self,
+        boxes_m: FloatArray,
+        kinds: NDArray[np.uint8],
+        layouts: IntArray,
+        counts: IntArray,
+    ) -> list[WorstPlaces | None]:
+        """Return the worst places behind each of several layouts (layouts,).
+
+        They are `None` where there are none, or an element has its own rules.
 
         Args:
             boxes_m: Left, bottom, right and top of numbered elements (elements, 4).
@@ -157,16 +172,35 @@ class PlainGround:
             layouts: Numbers of the elements of each layout (layouts, most).
             counts: How many each has (layouts,).
         """
-        from blast_env.vehicles.worst_kernels import put_stand_offs  # as in `worst`
+        arrays = self._behind(boxes_m, kinds, layouts, counts, self.source.places)
+        lists = (array.tolist() for array in arrays)
+        return [
+            WorstPlaces(self.source, tuple(map(tuple, of_one[:count])), tuple(away_m[:count]))
+            if count
+            else None
+            for of_one, away_m, count in zip(*lists, strict=True)
+        ]
 
-        found = np.empty(len(layouts))
+    def _behind(
+        self,
+        boxes_m: FloatArray,
+        kinds: NDArray[np.uint8],
+        layouts: IntArray,
+        counts: IntArray,
+        most: int,
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the worst places, their distances and their number; see `put_worst`."""
+        from blast_env.vehicles.worst_kernels import put_worst  # as in `worst`
+
+        count = len(layouts)
+        arrays = np.empty((count, most, 2)), np.empty((count, most)), np.empty(count, np.int64)
         always, never, starts, _ = self.query.boxes
-        put_stand_offs(
+        put_worst(
             *(boxes_m, kinds, layouts, counts, always, never, starts, self.query.half),
             *(*self._empty, PER_M, self.walls_m, self.middles_m),
-            *(self.source.least_apart_m, _EQUAL_M, found),
+            *(self.source.least_apart_m, _EQUAL_M, *arrays),
         )
-        return found
+        return arrays
 
 
 def _middles_m(walls: Sequence[Wall]) -> FloatArray:
