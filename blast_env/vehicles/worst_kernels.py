@@ -137,23 +137,26 @@ def worst_against(
     y, lattice_y = with_edges(cuts_y, more, 1), with_edges(places_y, more, 1)
     closed, solid = _joined(always, more, 0, count), _joined(never, more, count, len(more))
     _, reached, clear = reached_parts(x, y, closed, solid, starts)
-    # 1. The squares of the distances of all places from the nearest wall, row by row.
-    x_m, y_m = lattice_x / per_m, lattice_y / per_m
-    nearest_m2, least_m2 = _nearest_m2(
-        x_m, y_m, _parts(x, lattice_x), _parts(y, lattice_y), reached & clear, walls_m
+    # 1. All places, row by row, and the squares of their distances from the nearest wall.
+    free_m, nearest_m2 = _free_places(
+        lattice_x / per_m,
+        lattice_y / per_m,
+        _parts(x, lattice_x),
+        _parts(y, lattice_y),
+        reached & clear,
+        walls_m,
     )
     # 2. The worst of those that are left, until there are enough or none is left. What is beyond
     #    all doubt by the squares takes no part in the exact comparison.
     chosen_m, distances_m = np.empty((most, 2)), np.empty(most)
     for rank in range(most):
         if rank:
-            least_m2 = _least_apart(
-                x_m, y_m, chosen_m[rank - 1], least_apart_m - equal_m, nearest_m2
-            )
+            _leave_apart(free_m, chosen_m[rank - 1], least_apart_m - equal_m, nearest_m2)
+        least_m2 = _least_of(nearest_m2)
         if least_m2 == inf:
             return chosen_m[:rank], distances_m[:rank]
         bound_m2 = (sqrt(least_m2) * (1.0 + _NEAR) + 2.0 * equal_m) ** 2
-        near_m = _up_to(x_m, y_m, nearest_m2, bound_m2)
+        near_m = _up_to(free_m, nearest_m2, bound_m2)
         worst = chosen_places(
             near_m, _distances_m(walls_m, near_m), middles_m, 1, least_apart_m, equal_m
         )[0]
@@ -250,61 +253,63 @@ def put_worst(
 
 
 @njit(error_model="numpy")
-def _nearest_m2(
+def _free_places(
     x_m: FloatArray,
     y_m: FloatArray,
     of_column: IntArray,
     of_row: IntArray,
     is_free: BoolArray,
     walls_m: FloatArray,
-) -> tuple[FloatArray, float]:
-    """Return the square of the distance of each place from the nearest wall (rows, columns).
+) -> tuple[FloatArray, FloatArray]:
+    """Return where a charge may go off (places, 2), and the squares of the distances (places,).
 
-    It is infinite where no charge goes off. The least of them is returned beside it.
+    Args:
+        x_m: Places along x.
+        y_m: Places along y.
+        of_column: The part of the plane that each place along x is in.
+        of_row: The same along y.
+        is_free: Whether a charge may go off in each part.
+        walls_m: The walls, of which the nearest counts (walls, 4).
     """
-    columns = len(x_m)
-    found, lowest = np.empty((len(y_m), columns)), np.full(columns, inf)
-    along_x = np.empty((len(walls_m), columns))
-    for wall in range(len(walls_m)):
-        for column in range(columns):
-            off_m = max(0.0, walls_m[wall, 0] - x_m[column], x_m[column] - walls_m[wall, 2])
-            along_x[wall, column] = off_m * off_m
+    along_x, along_y = _along(x_m, walls_m, 0), _along(y_m, walls_m, 1)
+    free_m, nearest_m2 = np.empty((len(x_m) * len(y_m), 2)), np.empty(len(x_m) * len(y_m))
+    count = 0
     for row in range(len(y_m)):
-        nearest, free = found[row], is_free[of_row[row]]
-        for column in range(columns):
-            nearest[column] = inf
-        for wall in range(len(walls_m)):
-            off_m = max(0.0, walls_m[wall, 1] - y_m[row], y_m[row] - walls_m[wall, 3])
-            along_y, of_wall = off_m * off_m, along_x[wall]
-            for column in range(columns):
-                nearest[column] = min(nearest[column], of_wall[column] + along_y)
-        for column in range(columns):
-            if not free[of_column[column]]:
-                nearest[column] = inf
-        for column in range(columns):
-            lowest[column] = min(lowest[column], nearest[column])
-    return found, _least_of(lowest)
+        if not is_free[of_row[row]].any():
+            continue
+        for column in range(len(x_m)):
+            if is_free[of_row[row], of_column[column]]:
+                least_m2 = inf
+                for wall in range(len(walls_m)):
+                    least_m2 = min(least_m2, along_x[column, wall] + along_y[row, wall])
+                free_m[count, 0], free_m[count, 1] = x_m[column], y_m[row]
+                nearest_m2[count] = least_m2
+                count += 1
+    return free_m[:count], nearest_m2[:count]
 
 
 @njit(error_model="numpy")
-def _least_apart(
-    x_m: FloatArray, y_m: FloatArray, chosen_m: FloatArray, apart_m: float, nearest_m2: FloatArray
-) -> float:
-    """Leave out the places near a chosen one, and return the least square that is left."""
+def _along(places_m: FloatArray, walls_m: FloatArray, axis: int) -> FloatArray:
+    """Return the squares of distances from walls along an axis (places, walls)."""
+    found = np.empty((len(places_m), len(walls_m)))
+    for wall in range(len(walls_m)):
+        low_m, high_m = walls_m[wall, axis], walls_m[wall, axis + 2]
+        for place in range(len(places_m)):
+            off_m = max(0.0, low_m - places_m[place], places_m[place] - high_m)
+            found[place, wall] = off_m * off_m
+    return found
+
+
+@njit(error_model="numpy")
+def _leave_apart(
+    free_m: FloatArray, chosen_m: FloatArray, apart_m: float, nearest_m2: FloatArray
+) -> None:
+    """Leave only the places apart from a chosen one: others are at an infinite distance."""
     bound_m2 = apart_m * apart_m * (1.0 + _NEAR)
-    lowest = np.full(len(x_m), inf)
-    for row in range(len(y_m)):
-        along_y, nearest = y_m[row] - chosen_m[1], nearest_m2[row]
-        if along_y * along_y <= bound_m2:
-            for column in range(len(x_m)):
-                along_x = x_m[column] - chosen_m[0]
-                if along_x * along_x + along_y * along_y <= bound_m2 and (
-                    hypot(along_x, along_y) < apart_m
-                ):
-                    nearest[column] = inf
-        for column in range(len(x_m)):
-            lowest[column] = min(lowest[column], nearest[column])
-    return _least_of(lowest)
+    for place in range(len(free_m)):
+        x_m, y_m = free_m[place, 0] - chosen_m[0], free_m[place, 1] - chosen_m[1]
+        if x_m * x_m + y_m * y_m <= bound_m2 and hypot(x_m, y_m) < apart_m:
+            nearest_m2[place] = inf
 
 
 @njit(error_model="numpy")
@@ -327,15 +332,14 @@ def _least_of(values: FloatArray) -> float:
 
 
 @njit(error_model="numpy")
-def _up_to(x_m: FloatArray, y_m: FloatArray, nearest_m2: FloatArray, bound_m2: float) -> FloatArray:
-    """Return the places up to a square of the distance, row by row (places, 2)."""
-    found = np.empty((nearest_m2.size, 2))
+def _up_to(free_m: FloatArray, nearest_m2: FloatArray, bound_m2: float) -> FloatArray:
+    """Return the places up to a square of the distance, in their order (places, 2)."""
+    found = np.empty((len(free_m), 2))
     count = 0
-    for row in range(len(y_m)):
-        for column in range(len(x_m)):
-            if nearest_m2[row, column] <= bound_m2:
-                found[count, 0], found[count, 1] = x_m[column], y_m[row]
-                count += 1
+    for place in range(len(free_m)):
+        if nearest_m2[place] <= bound_m2:
+            found[count, 0], found[count, 1] = free_m[place, 0], free_m[place, 1]
+            count += 1
     return found[:count]
 
 
