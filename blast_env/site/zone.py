@@ -233,17 +233,14 @@ class BuildZone(Section):
 
     def cell_rectangle_m(self, cell: Cell) -> Rectangle:
         """Return the square that a cell covers."""
-        row, column = cell
-        corner = (
-            self.corner_m[0] + column * MODULE_SIDE_M,
-            self.corner_m[1] + row * MODULE_SIDE_M,
-        )
-        return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))
+        return self.cells_rectangle_m(*cell, 1, 1)
 
     def cells_rectangle_m(self, row: int, column: int, rows: int, columns: int) -> Rectangle:
         """Return the rectangle of cells, m, by its lower left cell and its numbers of cells."""
-        corner = self.cell_rectangle_m((row, column))[:2]
-        return Rectangle.from_corner(corner, (columns * MODULE_SIDE_M, rows * MODULE_SIDE_M))
+        left_m, bottom_m = self.corner_m
+        left_m, bottom_m = left_m + column * MODULE_SIDE_M, bottom_m + row * MODULE_SIDE_M
+        right_m, top_m = left_m + columns * MODULE_SIDE_M, bottom_m + rows * MODULE_SIDE_M
+        return Rectangle(left_m, bottom_m, right_m, top_m)
 
     def has(self, cell: Cell) -> bool:
         """Return whether a cell lies in the grid."""

@@ -396,7 +396,7 @@ class Surrogate:
             if site.counts_peaks:
                 found[1].append(logs[members:].reshape(len(logs) - members, -1))
         place = np.empty(len(layouts), dtype=np.int64)
-        place[order] = range(len(place))
+        place[order] = np.arange(len(place))
         return place
 
     def upper_ends(self, guess: Guess) -> Guess:

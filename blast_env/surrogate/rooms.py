@@ -34,23 +34,25 @@ class Room:
 
 
 class KeptRoom(Room):
-    """Gives arrays of its own, one of each name: a name asked for again takes the earlier one."""
+    """Gives arrays of its own, one of each name: a name asked for again takes the earlier one.
+
+    Attributes:
+        nbytes: Size in memory.
+    """
 
     def __init__(self) -> None:
         self._kept: dict[str, NDArray[Any]] = {}
         self._sets: dict[Hashable, Any] = {}
-
-    @property
-    def nbytes(self) -> int:
-        """Size in memory."""
-        return sum([array.nbytes for array in self._kept.values()])
+        self.nbytes = 0
 
     def __call__(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return an array of a name, shape and type, with any content."""
         size = prod(shape)
         kept = self._kept.get(name)
         if kept is None or kept.size < size:
+            self.nbytes -= 0 if kept is None else kept.nbytes
             kept = self._kept[name] = np.empty(size, dtype)
+            self.nbytes += kept.nbytes
             self._sets.clear()  # they have the smaller one
         return kept[:size].reshape(shape)
 

@@ -64,6 +64,7 @@ class SurrogateSite:
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
+        self._terraces = [part for part in scenario.structures if part.carries]
         self._boxes: dict[Element, Box | None] = {}  # none of a measure
         self._triangular = {
             structure.name: TriangularLoads(
@@ -138,16 +139,18 @@ class SurrogateSite:
             if element not in boxes:
                 boxes[element] = None
                 if not isinstance(element, Measure):
-                    height_m = zone.catalogue.variant(element).height_m
-                    boxes[element] = self._box(zone.element_rectangle_m(element), height_m)
+                    (row, column), variant = element[:2], zone.catalogue.variant(element)
+                    own_m = zone.cells_rectangle_m(row, column, variant.rows, variant.columns)
+                    boxes[element] = self._box(own_m, variant.height_m)
         return [box for element in layout if (box := boxes[element]) is not None]
 
     def _box(self, rectangle_m: Rectangle, own_m: float | None) -> Box:
         """Return the rectangle and the top of a piece of a height, on its ground."""
         if not own_m:
             return (*rectangle_m, self.scenario.air_height_m)
-        terraces = [structure for structure in self.scenario.structures if structure.carries]
-        return (*rectangle_m, ground_below_m(terraces, rectangle_m) + own_m)
+        if self._terraces:
+            own_m += ground_below_m(self._terraces, rectangle_m)
+        return (*rectangle_m, own_m)
 
 
 def _in_lines(boxes: Sequence[Rectangle]) -> list[Rectangle]:
