@@ -31,15 +31,20 @@ from blast_env.surrogate.layers import (
 from blast_env.surrogate.points import WallPoints
 from blast_env.surrogate.relations import RELATIONS, put_relations
 from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, SINGLE, Counts, Room
-from blast_env.surrogate.ways import ASIDE_M, FALLS_M, SHARES, STATIONS, put_stopped_by
+from blast_env.surrogate.ways import (
+    ASIDE_M,
+    PLACES,
+    SHARES,
+    STATIONS,
+    put_shares_of,
+    put_stopped_by,
+)
 
 Numbers = NDArray[np.int32]
 
 INTEGER: Final = np.dtype(np.int32)
 
-_FALLS: Final = len(FALLS_M)
 _ASIDES: Final = len(ASIDE_M)
-_PLACES: Final = len(STATIONS) * _ASIDES
 
 
 class NetworkLayers(NamedTuple):
@@ -345,16 +350,15 @@ def _put_messages(
 ) -> None:
     """Put the messages of solids (members, solids, rows, length); the last point fills up rows."""
     members, solids, rows, length = found.shape
-    related, number = bench.related, 0
+    related = bench.related
     for solid in range(solids):
         for row in range(rows):
-            point = min(row, relations.shape[1] - 1)
+            point, first = min(row, relations.shape[1] - 1), (solid * rows + row) * RELATIONS
             for index in range(RELATIONS):
                 value = relations[solid, point, index] - scales.mean[FEATURES + index]
                 scaled = value / scales.scale[FEATURES + index]
-                related[number] = min(max(scaled, -scales.most), scales.most)
-                number += 1
-    given = related[:number].reshape((1, solids * rows, RELATIONS))
+                related[first + index] = min(max(scaled, -scales.most), scales.most)
+    given = related[: solids * rows * RELATIONS].reshape((1, solids * rows, RELATIONS))
     said = found.reshape((members, solids * rows, length))
     put_two_layers(given, *sending, bench.middle, said)
 
@@ -409,38 +413,28 @@ def _put_shares(
 ) -> None:
     """Put the scaled open shares of each row behind the pieces of a layout, before its messages."""
     points, rows = len(charge.stopped), whole(len(charge.stopped))
-    below = np.empty((len(STATIONS), _ASIDES), dtype=np.uint8)
-    shares = np.empty(SHARES)
+    places, shares = points * PLACES, np.empty(SHARES)
+    below, straight = np.empty(places, dtype=np.uint8), np.empty(points, dtype=np.bool_)
+    by_none = charge.stopped.reshape(places)
+    for place in range(places):
+        below[place] = by_none[place]
     for point in range(points):
-        straight = charge.is_straight_open[point]
-        for station in range(len(STATIONS)):
-            for aside in range(_ASIDES):
-                below[station, aside] = charge.stopped[point, station, aside]
-        # 1. Several pieces stop as many detours by a place as the one that stops most.
-        for piece in own:
-            if piece == 0:
-                break
-            if piece > 0:
-                straight = straight and kept.is_open[piece - 1, point]
-                for station in range(len(STATIONS)):
-                    for aside in range(_ASIDES):
-                        stops = kept.stopped[piece - 1, point, station, aside]
-                        below[station, aside] = max(below[station, aside], stops)
-            else:
-                straight = straight and new.is_open[-piece - 1, point]
-                for station in range(len(STATIONS)):
-                    for aside in range(_ASIDES):
-                        stops = new.stopped[-piece - 1, point, station, aside]
-                        below[station, aside] = max(below[station, aside], stops)
-        # 2. The shares that are left, and 3. their scaled and bounded values.
-        shares[:] = 0.0
-        shares[-1] = 1.0 if straight else 0.0
-        for station in range(len(STATIONS)):
-            for aside in range(_ASIDES):
-                stops = below[station, aside]
-                left = charge.weights[point, station, (aside + 1) // 2, stops]
-                for fall in range(_FALLS):
-                    shares[station * _FALLS + fall] += left[fall]
+        straight[point] = charge.is_straight_open[point]
+    # 1. Several pieces stop as many detours by a place as the one that stops most.
+    for piece in own:
+        if piece == 0:
+            break
+        of, number = (kept, piece - 1) if piece > 0 else (new, -piece - 1)
+        by_piece, is_open = of.stopped[number].reshape(places), of.is_open[number]
+        for place in range(places):
+            below[place] = max(below[place], by_piece[place])
+        for point in range(points):
+            straight[point] = straight[point] and is_open[point]
+    # 2. The shares that are left, and 3. their scaled and bounded values.
+    for point in range(points):
+        first = point * PLACES
+        own_below = below[first : first + PLACES]
+        put_shares_of(own_below, straight[point], charge.weights[point], shares)
         for share in range(SHARES):
             index = FEATURES - SHARES + share
             scaled = (shares[share] - scales.mean[index]) / scales.scale[index]

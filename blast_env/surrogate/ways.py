@@ -32,6 +32,9 @@ ABOVE_M: Final = np.array((0.0, 0.7, 1.5, 2.5, 4.0, 6.0))
 FALLS_M: Final = (0.1, 0.3, 1.0, 3.0)
 """Decay lengths of the weight of a detour for 100 kg; Hopkinson-Cranz scaling for other charges."""
 
+PLACES: Final = len(STATIONS) * len(ASIDE_M)
+"""Number of places of detours in plan per point."""
+
 SHARES: Final = len(STATIONS) * len(FALLS_M) + 1
 """Number of open shares per point: the last is 1 if the straight path is open, otherwise 0."""
 
@@ -205,12 +208,12 @@ def put_stopped_by(
     is_open: BoolArray,
 ) -> None:
     """Put what `Ways.stopped_by` returns into `found` and `is_open`."""
+    by_none, by_each = stopped.reshape(stopped.size), found.reshape((len(found), stopped.size))
     for solid in range(len(solids)):  # slices would compile NumPy's messages too
         for point in range(len(points_m)):
             is_open[solid, point] = is_straight_open[point]
-            for station in range(stopped.shape[1]):
-                for aside in range(stopped.shape[2]):
-                    found[solid, point, station, aside] = stopped[point, station, aside]
+        for place in range(len(by_none)):
+            by_each[solid, place] = by_none[place]
     is_behind = np.empty(len(points_m), dtype=np.bool_)
     _stop(start_m, points_m, by_m, by_height_m, solids, found, is_open, is_behind)
 
@@ -366,19 +369,35 @@ def put_open_shares(
     shares: FloatArray,
 ) -> None:
     """Put the shares of open paths to some of the points (chosen, SHARES)."""
-    _, stations, asides = stopped.shape
-    falls = weights.shape[-1]
+    below = stopped.reshape((len(stopped), PLACES))
     for number in range(len(chosen)):
-        point, own = chosen[number], shares[number]
-        for share in range(stations * falls):
-            own[share] = 0.0
-        for station in range(stations):
-            for aside in range(asides):
-                below = stopped[point, station, aside]
-                for fall in range(falls):
-                    left = weights[point, station, (aside + 1) // 2, below, fall]
-                    own[station * falls + fall] += left
-        own[stations * falls] = 1.0 if is_straight_open[point] else 0.0
+        point = chosen[number]
+        put_shares_of(below[point], is_straight_open[point], weights[point], shares[number])
+
+
+@njit(error_model="numpy")
+def put_shares_of(
+    below: Counts, is_straight_open: bool, weights: FloatArray, shares: FloatArray
+) -> None:
+    """Put the shares of open paths to a point (SHARES,).
+
+    Args:
+        below: Number of stopped paths by each place (PLACES,).
+        is_straight_open: Whether the straight path is open.
+        weights: Those of `Ways.weights` to the point.
+        shares: The shares.
+    """
+    # The four decay lengths side by side.
+    for station in range(len(STATIONS)):
+        all_0 = all_1 = all_2 = all_3 = 0.0
+        for aside in range(len(ASIDE_M)):
+            left = weights[station, (aside + 1) // 2, below[station * len(ASIDE_M) + aside]]
+            all_0, all_1 = all_0 + left[0], all_1 + left[1]
+            all_2, all_3 = all_2 + left[2], all_3 + left[3]
+        first = station * len(FALLS_M)
+        shares[first], shares[first + 1] = all_0, all_1
+        shares[first + 2], shares[first + 3] = all_2, all_3
+    shares[SHARES - 1] = 1.0 if is_straight_open else 0.0
 
 
 @compiled(nogil=True, error_model="numpy")
