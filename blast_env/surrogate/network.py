@@ -29,7 +29,7 @@ from blast_env.surrogate.layers import SingleArray, two_layers
 from blast_env.surrogate.loads import NetworkLayers, Scales, mean_and_spread
 from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
 from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.rooms import Room
+from blast_env.surrogate.rooms import Room, in_lines
 from blast_env.surrogate.walls import SurrogateSite
 from blast_env.surrogate.ways import SHARES
 
@@ -456,8 +456,8 @@ class Surrogate:
         """The networks of impulses alone, and those of impulses and of peaks."""
         alone = self.impulse.layers(0, IMPULSE_POWER)
         of_peaks = self.peak.layers(1, PEAK_POWER)
-        arrays: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(alone, of_peaks, strict=True))
-        return alone, NetworkLayers(*map(np.concatenate, arrays))
+        both = map(np.concatenate, zip(alone, of_peaks, strict=True))
+        return NetworkLayers(*map(_in_lines, alone)), NetworkLayers(*map(_in_lines, both))
 
     @cached_property
     def _scales(self) -> Scales:
@@ -470,6 +470,12 @@ class Surrogate:
     def related(self, relations: FloatArray) -> FloatArray:
         """Return the scaled and bounded relations (solids x points, RELATIONS)."""
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
+
+
+def _in_lines(array: NDArray[Any]) -> NDArray[Any]:
+    found = in_lines(array.shape, array.dtype)
+    found[...] = array
+    return found
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:

@@ -33,7 +33,7 @@ from blast_env.surrogate.loads import (
     put_loads,
     put_pieces,
 )
-from blast_env.surrogate.rooms import SINGLE, KeptRoom, Room
+from blast_env.surrogate.rooms import SINGLE, KeptRoom, Room, in_lines
 
 Box = tuple[float, ...]
 """Left, bottom, right, top and height of a piece, m."""
@@ -207,7 +207,7 @@ def _with(kept: NDArray[Any], more: NDArray[Any], first: int, axis: int = 0) -> 
     before = (slice(None),) * axis
     if after > kept.shape[axis]:
         most = max(after, 2 * first, _LEAST_ROOM)  # memory that nobody writes to costs nothing
-        grown = np.empty((*kept.shape[:axis], most, *kept.shape[axis + 1 :]), kept.dtype)
+        grown = in_lines((*kept.shape[:axis], most, *kept.shape[axis + 1 :]), kept.dtype)
         grown[(*before, slice(first))] = kept[(*before, slice(first))]
         kept = grown
     kept[(*before, slice(first, after))] = more

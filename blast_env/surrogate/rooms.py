@@ -21,12 +21,27 @@ BOOL: Final = np.dtype(np.bool_)
 _MOST_SETS: Final = 1024
 
 
+_LINE_BYTES: Final = 64
+"""Size of a line of a processor's cache, and of its largest vectors."""
+
+
+def in_lines(shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return an array with any content that begins with a line of the cache.
+
+    NumPy's begin anywhere, and a vector that lies in two lines is loaded twice.
+    """
+    size = prod(shape) * dtype.itemsize
+    memory = np.empty(size + _LINE_BYTES, BYTE)
+    first = -memory.ctypes.data % _LINE_BYTES
+    return memory[first : first + size].view(dtype).reshape(shape)
+
+
 class Room:
     """Gives new arrays, with any content."""
 
     def __call__(self, _name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return an array of a name, shape and type."""
-        return np.empty(shape, dtype)
+        return in_lines(shape, dtype)
 
     def together(self, _key: Hashable, make: Callable[["Room"], Made]) -> Made:
         """Return a set of arrays from this room; the key has its kind and all sizes."""
@@ -51,7 +66,7 @@ class KeptRoom(Room):
         kept = self._kept.get(name)
         if kept is None or kept.size < size:
             self.nbytes -= 0 if kept is None else kept.nbytes
-            kept = self._kept[name] = np.empty(size, dtype)
+            kept = self._kept[name] = in_lines((size,), dtype)
             self.nbytes += kept.nbytes
             self._sets.clear()  # they have the smaller one
         return kept[:size].reshape(shape)
