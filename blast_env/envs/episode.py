@@ -254,7 +254,7 @@ class Episode:
     chosen: ActionChoice | None = None
     invalid_actions: int = 0
     without_effect: int = 0
-    final: Layout | None = None
+    final: LegalLayout | None = None
     loads: dict[Layout, Assessment] = field(default_factory=dict)
 
     @property
@@ -483,12 +483,21 @@ class Episodes:
         ended = stops | layouts.is_full[rows]
         self.ended[rows] = ended
         self._ended_now = chosen[ended].tolist()
-        vehicles = [self.running[index].shown.vehicles for index in self._ended_now]
-        finals = layouts.checked_against(self._ended_now, vehicles)
-        for index, final in zip(self._ended_now, finals, strict=True):
-            self.running[index].final = final
+        for index in self._ended_now:
+            self.running[index].final = layouts.checked(index)
+        if self.task.source.representative.vehicles:
+            self._find_worst_places()
         if self._of_turns is not None:
             self._turns = {index: self._turn(index) for index in indices}
+
+    def _find_worst_places(self) -> None:
+        """Find the worst places of vehicles against the final layouts, which have them then."""
+        coming = {}
+        for index in self._ended_now:
+            episode = self.running[index]
+            assert episode.final is not None
+            coming[index] = episode.final, episode.shown.vehicles
+        self.layouts.find_worst(coming)
 
     def _turn(self, index: int) -> Transition:
         """Return the last turn of an episode."""

@@ -233,14 +233,10 @@ class LoadCaseSet:
         threats = self.threats[: len(self.charges)]
         return tuple(threat.charge_against(self.scenario, layout) for threat in threats)
 
-    @cached_property
-    def _risk(self) -> Risk:
-        return self.risk or self.scenario.objective.risk
-
     @property
     def is_mean(self) -> bool:
         """Whether the risk measure is the mean over the charges."""
-        return isinstance(self._risk, MeanRisk)
+        return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
 
     def combined(self, loads: Sequence[float] | FloatArray) -> float:
         """Combine loads into one: the mean per charge, then the risk measure over the charges.
@@ -250,7 +246,7 @@ class LoadCaseSet:
         """
         # 1. A single load is its own mean and its own worst; 2. the mean over the realisations of
         # each charge; 3. the risk measure over the charges.
-        risk = self._risk
+        risk = self.risk or self.scenario.objective.risk
         if len(loads) == 1 and isinstance(risk, MeanRisk | WorstRisk):
             return float(loads[0])
         values = np.asarray(loads, dtype=np.float64)

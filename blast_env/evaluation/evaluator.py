@@ -282,7 +282,9 @@ def loads_together(
         known = evaluator.store.get(key, evaluator.scenario)
         if known is None:
             # The charge, or the vehicle that carries it to the place in the key.
-            cells = layout.in_order(key.layout) if isinstance(layout, LegalLayout) else key.layout
+            cells = key.layout
+            if isinstance(layout, LegalLayout) and layout.worst:
+                cells = layout.in_order(cells)
             blast = EngineBlast(evaluator.scenario, cells, threat.charge, key.seed)
             missing[number] = key, evaluator, blast
         else:

@@ -1,6 +1,6 @@
 """Layouts of several environments that grow in place, with their legal places, in arrays."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from sys import getrefcount
@@ -204,22 +204,20 @@ class LayoutBatch:
 
     def checked(self, index: int) -> LegalLayout:
         """Return the same, marked as checked by its rules."""
-        return LegalLayout.of(self.rules[index].scenario, self.elements(index))
+        layout = LegalLayout(self.elements(index))
+        layout.scenario, layout.worst = self.rules[index].scenario, {}
+        return layout
 
-    def checked_against(
-        self, indices: Sequence[int], vehicles: Sequence[Sequence[VehicleSource]]
-    ) -> list[LegalLayout]:
-        """Return the same of several layouts, with the worst places of vehicles on plain ground.
+    def find_worst(self, coming: Mapping[int, tuple[LegalLayout, Iterable[VehicleSource]]]) -> None:
+        """Find the worst places of vehicles on plain ground against layouts, which have them then.
 
         Args:
-            indices: The layouts.
-            vehicles: The vehicles that may come to each of them.
+            coming: The layouts as checked, and the vehicles that come to each of them.
         """
-        found = {index: self.checked(index) for index in indices}
         # Places of a vehicle against all layouts on its site are found at once.
         groups: dict[tuple[int, int], tuple[VehicleSource, list[int]]] = {}
-        for index, of_layout in zip(indices, vehicles, strict=True):
-            for source in of_layout:
+        for index, (_, vehicles) in coming.items():
+            for source in vehicles:
                 key = id(self.rules[index]), id(source)
                 groups.setdefault(key, (source, []))[1].append(index)
         for source, own in groups.values():
@@ -231,8 +229,7 @@ class LayoutBatch:
             places = ground.worst_of_many(*arrays, self.placed[own])
             for index, worst in zip(own, places, strict=True):
                 if worst is not None:
-                    found[index].worst[id(source)] = worst
-        return list(found.values())
+                    coming[index][0].worst[id(source)] = worst
 
     def state(self, index: int) -> LayoutState:
         """Return a layout as it is now."""

@@ -56,8 +56,9 @@ def worst_places(
     Args:
         layout: (row, column) of the build-zone cells with a barrier module, or pieces.
     """
-    is_checked = isinstance(layout, LegalLayout) and layout.scenario is scenario
-    known = layout.worst if is_checked else {}
+    known: dict[int, WorstPlaces] = {}
+    if isinstance(layout, LegalLayout) and layout.scenario is scenario:
+        known = layout.worst
     found = known.get(id(source))
     if found is None or found.source is not source:
         ground = scenario.vehicle_ground(source, layout)

@@ -109,7 +109,9 @@ class LayoutState:
     @cached_property
     def checked(self) -> LegalLayout:
         """The layout, marked as checked by `of` and `place`."""
-        return LegalLayout.of(self.scenario, self.layout)
+        layout = LegalLayout(self.layout)
+        layout.scenario, layout.worst = self.scenario, {}
+        return layout
 
     def place(self, element: Element) -> "LayoutState":
         """Return the placement with one more module or piece.

@@ -416,18 +416,18 @@ def _put_shares(
     places, shares = points * PLACES, np.empty(SHARES)
     below, straight = np.empty(places, dtype=np.uint8), np.empty(points, dtype=np.bool_)
     by_none = charge.stopped.reshape(places)
-    for place in range(places):
-        below[place] = by_none[place]
+    for number in range(places):
+        below[number] = by_none[number]
     for point in range(points):
         straight[point] = charge.is_straight_open[point]
     # 1. Several pieces stop as many detours by a place as the one that stops most.
     for piece in own:
         if piece == 0:
             break
-        of, number = (kept, piece - 1) if piece > 0 else (new, -piece - 1)
-        by_piece, is_open = of.stopped[number].reshape(places), of.is_open[number]
-        for place in range(places):
-            below[place] = max(below[place], by_piece[place])
+        of, own_number = (kept, piece - 1) if piece > 0 else (new, -piece - 1)
+        by_piece, is_open = of.stopped[own_number].reshape(places), of.is_open[own_number]
+        for number in range(places):
+            below[number] = max(below[number], by_piece[number])
         for point in range(points):
             straight[point] = straight[point] and is_open[point]
     # 2. The shares that are left, and 3. their scaled and bounded values.

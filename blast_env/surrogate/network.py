@@ -456,8 +456,13 @@ class Surrogate:
         """The networks of impulses alone, and those of impulses and of peaks."""
         alone = self.impulse.layers(0, IMPULSE_POWER)
         of_peaks = self.peak.layers(1, PEAK_POWER)
-        both = map(np.concatenate, zip(alone, of_peaks, strict=True))
-        return NetworkLayers(*map(_in_lines, alone)), NetworkLayers(*map(_in_lines, both))
+        pairs: list[tuple[NDArray[Any], NDArray[Any]]] = list(zip(alone, of_peaks, strict=True))
+        stacks: tuple[list[Any], list[Any]] = list(alone), list(map(np.concatenate, pairs))
+        for arrays in stacks:
+            for number, array in enumerate(arrays):
+                arrays[number] = in_lines(array.shape, array.dtype)
+                arrays[number][...] = array
+        return NetworkLayers(*stacks[0]), NetworkLayers(*stacks[1])
 
     @cached_property
     def _scales(self) -> Scales:
@@ -470,12 +475,6 @@ class Surrogate:
     def related(self, relations: FloatArray) -> FloatArray:
         """Return the scaled and bounded relations (solids x points, RELATIONS)."""
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
-
-
-def _in_lines(array: NDArray[Any]) -> NDArray[Any]:
-    found = in_lines(array.shape, array.dtype)
-    found[...] = array
-    return found
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ Layouts have many pieces in common, and what a piece does to a point depends on 
 each piece is computed once per charge.
 
 Most charges and pieces of training are never met again. What is known of them is kept from the
-second time on, that of pieces from the third; before, it is in room that the next charge takes.
+second time on, that of pieces from the fifth; before, it is in room that the next charge takes.
 """
 
 from collections import OrderedDict
@@ -42,7 +42,7 @@ _MOST_BYTES: Final = 2**26
 _MOST_MET: Final = 4096
 """Charges that count as met before."""
 
-_OFTEN: Final = 2
+_OFTEN: Final = 4
 """Times that a piece is met without being kept."""
 
 
@@ -169,7 +169,7 @@ class PieceKnowledge:
                 *(np.array(new), self._start_m, self._scale_m, site.points, self._scales),
                 *(self._layers, self._own, bench, fresh),
             )
-        # 2. The loads, and 3. pieces met for the third time are kept.
+        # 2. The loads, and 3. pieces met for the fifth time are kept.
         loads = np.empty((len(self._base), len(layouts), len(site.points.starts)))
         put_loads(
             *(found, site.points, self._scales, self._layers, self._own, self._base),

@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -64,7 +65,7 @@ class SurrogateSite:
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
-        self._terraces = [part for part in scenario.structures if part.carries]
+        self._terraces = list(filter(attrgetter("carries"), scenario.structures))
         self._boxes: dict[Element, Box | None] = {}  # none of a measure
         self._triangular = {
             structure.name: TriangularLoads(
