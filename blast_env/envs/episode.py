@@ -367,6 +367,7 @@ class Episodes:
         self._sites: OrderedDict[int, _Site] = OrderedDict()
         self._most_sites = max(count, 4)
         first = self.site_of(task.source.representative)  # an unsuitable engine fails here
+        self._meets_vehicles = bool(first.empty.scenario.vehicles)
         catalogue = task.source.representative.zone.catalogue
         self.code = task.actions.code(catalogue, first.actions.finish + 1)
         self.layouts = LayoutBatch(first.empty, first.rules, count)
@@ -485,7 +486,7 @@ class Episodes:
         self._ended_now = chosen[ended].tolist()
         for index in self._ended_now:
             self.running[index].final = layouts.checked(index)
-        if self.task.source.representative.vehicles:
+        if self._meets_vehicles:
             self._find_worst_places()
         if self._of_turns is not None:
             self._turns = {index: self._turn(index) for index in indices}
