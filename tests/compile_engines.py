@@ -26,7 +26,7 @@ from blast_env.gas import (
 )
 from blast_env.layout import draw_charge
 from blast_env.site import Scenario
-from blast_env.surrogate import SurrogateEngine, Ways, solid_relations
+from blast_env.surrogate import SurrogateEngine, Ways, piece_traits, solid_relations
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
@@ -65,6 +65,7 @@ def surrogate() -> None:
     points = np.array([[9.0, 0.0, 1.0]])
     Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
     solid_relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
+    piece_traits(np.zeros(3), 1.0, piece, piece)
     envs = BlastBarrierVectorEnv(
         2, scenario="control_room", engine=SurrogateEngine(), observation="features", action="place"
     )

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         predictions,
     )
     from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor, least_sites
+    from blast_env.surrogate.neighbours import TRAITS, piece_traits
     from blast_env.surrogate.network import (
         SHAPES,
         Check,
@@ -48,6 +49,7 @@ __all__ = [
     "SHAPES",
     "SHARES",
     "STATIONS",
+    "TRAITS",
     "Check",
     "Correction",
     "Fit",
@@ -71,6 +73,7 @@ __all__ = [
     "load_errors",
     "load_surrogate",
     "packaged_surrogate",
+    "piece_traits",
     "predictions",
     "site_of",
     "solid_relations",

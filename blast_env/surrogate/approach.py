@@ -12,6 +12,7 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
 from blast_env.curves.kingery_bulmash import CURVES_SCALED_M, curve_polynomial, kingery_bulmash
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.points import WallPoints
 from blast_env.surrogate.relations import RELATIONS, put_relations, solid_relations
 from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, Counts, Room
@@ -40,8 +41,8 @@ _GEOMETRY: Final = 7
 FEATURES: Final = _GEOMETRY + 2 * SHARES
 """Inputs of a network per point: geometry and path shares."""
 
-INPUTS: Final = FEATURES + RELATIONS
-"""Inputs per point, plus those per solid and point."""
+INPUTS: Final = FEATURES + RELATIONS + TRAITS
+"""Inputs per point, those per solid and point, and those per piece."""
 
 
 class ApproachArrays(NamedTuple):

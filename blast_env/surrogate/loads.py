@@ -1,7 +1,9 @@
 """Loads of layouts by the surrogate's networks, in compiled code.
 
-What a piece does to a point depends on no other piece. Of each place in plan a piece stops the
-lowest paths, so that several together stop as many as the one that stops most. Messages add up.
+What a piece says to a point depends on no other piece. Of each place in plan a piece stops the
+lowest paths, so that several together stop as many as the one that stops most. Messages add up,
+each weighted by how its piece stands to the others of the layout: these weights alone are found for
+each layout anew.
 
 Networks of impulses and of peaks pass one after the other as members of one stack.
 """
@@ -28,6 +30,7 @@ from blast_env.surrogate.layers import (
     put_two_layers,
     whole,
 )
+from blast_env.surrogate.neighbours import TRAITS, put_traits
 from blast_env.surrogate.points import WallPoints
 from blast_env.surrogate.relations import RELATIONS, put_relations
 from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, SINGLE, Counts, Room
@@ -45,6 +48,7 @@ Numbers = NDArray[np.int32]
 INTEGER: Final = np.dtype(np.int32)
 
 _ASIDES: Final = len(ASIDE_M)
+_BOX: Final = 5
 
 
 class NetworkLayers(NamedTuple):
@@ -59,6 +63,10 @@ class NetworkLayers(NamedTuple):
         piece_send_bias: The same.
         piece_message: The same.
         piece_message_bias: The same.
+        trait: Weights of the first layer of the weights of messages (members, TRAITS, length).
+        trait_bias: Its biases (members, length).
+        weight: Weights of the second layer of these (members, length, length).
+        weight_bias: Its biases (members, length).
         constant: Weights of the first layer at points, of inputs that no layout changes and of the
             messages of structures (members, n + length, width).
         first_bias: Its biases (members, width).
@@ -80,6 +88,10 @@ class NetworkLayers(NamedTuple):
     piece_send_bias: SingleArray
     piece_message: SingleArray
     piece_message_bias: SingleArray
+    trait: SingleArray
+    trait_bias: SingleArray
+    weight: SingleArray
+    weight_bias: SingleArray
     constant: SingleArray
     first_bias: SingleArray
     first: SingleArray
@@ -95,7 +107,7 @@ class Scales(NamedTuple):
     """Mean and standard deviation of inputs, and the bound on the scaled values.
 
     Attributes:
-        mean: Means of features, then of relations.
+        mean: Means of features, then of relations, then of traits.
         scale: Standard deviations.
         most: The bound.
     """
@@ -109,11 +121,13 @@ class Pieces(NamedTuple):
     """What is known of some pieces.
 
     Attributes:
+        boxes: Left, bottom, right, top and height of each, m (pieces, 5).
         stopped: Number of paths that each stops (pieces, points, stations, asides).
         is_open: Whether the straight path is open (pieces, points).
         messages: Their messages (members, pieces, rows, length).
     """
 
+    boxes: FloatArray
     stopped: Counts
     is_open: BoolArray
     messages: SingleArray
@@ -123,6 +137,7 @@ class Pieces(NamedTuple):
         """Return arrays with any content."""
         members, _, length = layers.message.shape
         return cls(
+            room("boxes of pieces", (pieces, _BOX), FLOAT),
             room("stopped by pieces", (pieces, points, len(STATIONS), _ASIDES), BYTE),
             room("open behind pieces", (pieces, points), BOOL),
             room("messages of pieces", (members, pieces, whole(points), length), SINGLE),
@@ -142,6 +157,10 @@ class Bench(NamedTuple):
         between: Four rows after the first layer (4, width).
         beyond: The same after the second one (4, width).
         parts: Parts of the sums of the last layer (4, PARTS).
+        boxes: Boxes of the pieces of a layout (pieces, 5).
+        traits: Their traits (pieces, TRAITS).
+        told: Their scaled traits, one row after the other (n,).
+        weights: The weights of their messages, by each member (n,).
     """
 
     relations: FloatArray
@@ -153,12 +172,22 @@ class Bench(NamedTuple):
     between: SingleArray
     beyond: SingleArray
     parts: SingleArray
+    boxes: FloatArray
+    traits: FloatArray
+    told: SingleArray
+    weights: SingleArray
 
     @classmethod
     def in_room(
-        cls, points: int, structures: int, layers: NetworkLayers, room: Room, pieces: int
+        cls,
+        points: int,
+        structures: int,
+        layers: NetworkLayers,
+        room: Room,
+        pieces: int,
+        most: int,
     ) -> "Bench":
-        """Return the arrays for a number of pieces."""
+        """Return the arrays for a number of new pieces, and a largest number in a layout."""
         members, _, length = layers.message.shape
         rows, (_, inputs, width) = whole(points), layers.constant.shape
         solids = max(structures, pieces)
@@ -172,6 +201,10 @@ class Bench(NamedTuple):
             room("between", (ROWS_AT_ONCE, width), SINGLE),
             room("beyond", (ROWS_AT_ONCE, width), SINGLE),
             room("parts", (ROWS_AT_ONCE, PARTS), SINGLE),
+            room("boxes of a layout", (most, _BOX), FLOAT),
+            room("traits of pieces", (most, TRAITS), FLOAT),
+            room("told of pieces", (whole(most) * TRAITS,), SINGLE),
+            room("weights of messages", (members * whole(most) * length,), SINGLE),
         )
 
 
@@ -249,7 +282,8 @@ def put_charges(
         first, last = asked.pieces[before], asked.pieces[after]
         count = last - first
         messages = flat[: members * count * rows * length].reshape((members, count, rows, length))
-        pieces = Pieces(room.stopped[:count], room.is_open[:count], messages)
+        of_pieces = room.boxes[:count], room.stopped[:count], room.is_open[:count]
+        pieces = Pieces(*of_pieces, messages)
         boxes = asked.boxes[first:last]
         put_pieces(boxes, start_m, scale_m, site.points, scales, layers, own, bench, pieces)
         for layout in range(before, after):
@@ -260,7 +294,9 @@ def put_charges(
             numbers[number] = 0
             put_loads(
                 numbers.reshape((1, len(numbers))),
-                site.points,
+                start_m,
+                scale_m,
+                site,
                 scales,
                 layers,
                 own,
@@ -322,6 +358,9 @@ def put_pieces(
     found: Pieces,
 ) -> None:
     """Put what is known of pieces, each of which depends on no other; see `put_charge`."""
+    for piece in range(len(boxes)):
+        for side in range(_BOX):
+            found.boxes[piece, side] = boxes[piece, side]
     put_stopped_by(
         start_m,
         points.points_m,
@@ -444,10 +483,60 @@ def _put_shares(
             given[row * inputs + share] = given[(points - 1) * inputs + share]
 
 
+@njit(error_model="numpy")
+def _put_weights(
+    own: Any,
+    start_m: FloatArray,
+    scale_m: float,
+    solids: FloatArray,
+    kept: Pieces,
+    new: Pieces,
+    scales: Scales,
+    layers: NetworkLayers,
+    bench: Bench,
+) -> int:
+    """Put the weights of the messages of the pieces of a layout; return the number of rows."""
+    # 1. Where they stand, and their traits.
+    count = 0
+    for piece in own:
+        if piece == 0:
+            break
+        for side in range(_BOX):
+            if piece > 0:
+                bench.boxes[count, side] = kept.boxes[piece - 1, side]
+            else:
+                bench.boxes[count, side] = new.boxes[-piece - 1, side]
+        count += 1
+    put_traits(start_m, scale_m, solids, bench.boxes, count, bench.traits)
+    # 2. Scaled and bounded; the last piece fills up rows. 3. Their weights, by each member.
+    rows, number = whole(count), 0
+    for row in range(rows):
+        for trait in range(TRAITS):
+            index = FEATURES + RELATIONS + trait
+            scaled = (bench.traits[min(row, count - 1), trait] - scales.mean[index]) / (
+                scales.scale[index]
+            )
+            bench.told[number] = min(max(scaled, -scales.most), scales.most)
+            number += 1
+    members, _, length = layers.weight.shape
+    put_two_layers(
+        bench.told[:number].reshape((1, rows, TRAITS)),
+        layers.trait,
+        layers.trait_bias,
+        layers.weight,
+        layers.weight_bias,
+        bench.middle,
+        bench.weights[: members * rows * length].reshape((members, rows, length)),
+    )
+    return rows
+
+
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def put_loads(
     layouts: Any,
-    walls: WallPoints,
+    start_m: FloatArray,
+    scale_m: float,
+    site: SiteArrays,
     scales: Scales,
     layers: NetworkLayers,
     charge: ApproachArrays,
@@ -464,12 +553,13 @@ def put_loads(
     kept, and from -1 down if they are new; 0 ends a layout.
     """
     own_frame()
-    starts, area_m2 = walls.starts, walls.area_m2
+    starts, area_m2 = site.points.starts, site.points.area_m2
     members, rows, width = base.shape
     of_kept, of_new, length = kept.messages.shape[1], new.messages.shape[1], new.messages.shape[3]
     points, given = len(area_m2), bench.given
     at, to, beside = place(given), place(bench.between), place(bench.beyond)
     said, now_said, sums = place(kept.messages), place(new.messages), place(bench.parts)
+    weights, weight_rows = place(bench.weights), 0
     lanes, same = lanes_at(at), (0, 0, 0, 0)
     loads = np.empty(len(starts))
     areas_m2 = np.zeros(len(starts))
@@ -483,6 +573,10 @@ def put_loads(
         is_bare = own[0] == 0
         inputs = SHARES if is_bare else SHARES + length
         _put_shares(own, charge, kept, new, scales, inputs, given)
+        if not is_bare:
+            weight_rows = _put_weights(
+                own, start_m, scale_m, site.solids, kept, new, scales, layers, bench
+            )
         for member in range(members):
             bases, to_first = place(base[member]), place(layers.first[member])
             to_second, bias = place(layers.second[member]), place(layers.second_bias[member])
@@ -491,21 +585,24 @@ def put_loads(
             loads[:] = 0.0
             structure = 0
             for row in range(0, rows, ROWS_AT_ONCE):
-                # 1. What the pieces say, added up.
+                # 1. What the pieces say, weighted and added up.
                 for number in range(row, row + ROWS_AT_ONCE):
                     for index in range(0, 0 if is_bare else length, 2 * lanes):
                         low = high = fill(at, np.float32(0.0))
+                        by = member * weight_rows * length + index
                         for piece in own:
                             if piece == 0:
                                 break
+                            by_low, by_high = load(weights, by), load(weights, by + lanes)
+                            by += length
                             if piece > 0:
                                 entry = ((member * of_kept + piece - 1) * rows + number) * length
-                                low = low + load(said, entry + index)
-                                high = high + load(said, entry + index + lanes)
+                                low = load(said, entry + index) * by_low + low
+                                high = load(said, entry + index + lanes) * by_high + high
                             else:
                                 entry = ((member * of_new - piece - 1) * rows + number) * length
-                                low = low + load(now_said, entry + index)
-                                high = high + load(now_said, entry + index + lanes)
+                                low = load(now_said, entry + index) * by_low + low
+                                high = load(now_said, entry + index + lanes) * by_high + high
                         store(at, number * inputs + SHARES + index, low)
                         store(at, number * inputs + SHARES + index + lanes, high)
                 # 2. Four points through the layers, from memory read once.

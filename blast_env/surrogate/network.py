@@ -1,7 +1,8 @@
 """The surrogate: small networks that predict the load at each point of a wall and its spread.
 
-Each solid sends a message to each point, computed from their relations. The prediction at a point
-is a function of the features of the point and the sum of all messages.
+Each solid sends a message to each point, computed from their relations. Those of pieces are
+weighted, number by number, by how a piece stands to the others. The prediction at a point is a
+function of the features of the point and the sum of all messages.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.layers import SingleArray, two_layers
 from blast_env.surrogate.loads import NetworkLayers, Scales, mean_and_spread
+from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.rooms import Room, in_lines
@@ -62,8 +64,9 @@ _MOST_SPREADS: Final = 4.0
 """Bound on the distance of inputs from their mean, in units of their scale."""
 
 _SENDING: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,))
+_WEIGHING: Final = ((TRAITS, MESSAGE), *_SENDING[1:])
 
-SHAPES: Final = (*_SENDING, *_SENDING) + (
+SHAPES: Final = (*_SENDING, *_SENDING, *_WEIGHING) + (
     (FEATURES + 2 * MESSAGE, HIDDEN),
     (HIDDEN,),
     (HIDDEN, HIDDEN),
@@ -111,7 +114,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[5] = 5
+    format: Literal[6] = 6
     command: str
     versions: dict[str, str]
     engine: str
@@ -187,8 +190,9 @@ class Guess(NamedTuple):
 class Member(NamedTuple):
     """A network: weights and biases of its layers, in the order of their use.
 
-    The first two layers compute the messages of structures, the next two those of pieces, the
-    others the prediction at a point from features and the sums of both.
+    The first two layers compute the messages of structures, the next two those of pieces, the next
+    two the weights of these by the traits of pieces, the others the prediction at a point from
+    features and the sums of both.
     """
 
     send: AnyFloats
@@ -199,6 +203,10 @@ class Member(NamedTuple):
     piece_send_bias: AnyFloats
     piece_message: AnyFloats
     piece_message_bias: AnyFloats
+    trait: AnyFloats
+    trait_bias: AnyFloats
+    weight: AnyFloats
+    weight_bias: AnyFloats
     first: AnyFloats
     first_bias: AnyFloats
     second: AnyFloats
@@ -240,6 +248,17 @@ class Networks:
         found: SingleArray = two_layers(given, *layers[: len(_SENDING)])
         return found
 
+    def weights(self, scaled: FloatArray) -> SingleArray:
+        """Return the weights of the numbers of the messages of pieces (members, pieces, MESSAGE).
+
+        Args:
+            scaled: Their traits, less the mean, over the scale (pieces, TRAITS).
+        """
+        given = np.ascontiguousarray(scaled, dtype=np.float32)[np.newaxis]
+        first = 2 * len(_SENDING)
+        found: SingleArray = two_layers(given, *self._layers[first : first + len(_WEIGHING)])
+        return found
+
     def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
         """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
 
@@ -274,7 +293,7 @@ class Networks:
             layers.first, (FEATURES - SHARES, FEATURES, FEATURES + MESSAGE), axis=1
         )
         arrays: list[Any] = [
-            *layers[: 2 * len(_SENDING)],
+            *layers[: 2 * len(_SENDING) + len(_WEIGHING)],
             np.concatenate((constants, structures), axis=1),
             layers.first_bias,
             np.concatenate((shares, pieces), axis=1),
@@ -291,7 +310,7 @@ class Surrogate:
     """Networks fitted to blasts.
 
     Attributes:
-        mean: Mean of each feature and each relation (INPUTS,).
+        mean: Mean of each feature, each relation and each trait (INPUTS,).
         scale: Their standard deviations (INPUTS,).
         impulse: The networks for impulses.
         peak: The networks for peak overpressures.
@@ -474,7 +493,13 @@ class Surrogate:
 
     def related(self, relations: FloatArray) -> FloatArray:
         """Return the scaled and bounded relations (solids x points, RELATIONS)."""
-        return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
+        own = slice(FEATURES, FEATURES + RELATIONS)
+        return bounded(relations, self.mean[own], self.scale[own])
+
+    def told(self, traits: FloatArray) -> FloatArray:
+        """Return the scaled and bounded traits (pieces, TRAITS)."""
+        own = slice(FEATURES + RELATIONS, INPUTS)
+        return bounded(traits, self.mean[own], self.scale[own])
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """What the surrogate knows of a charge and of the pieces of layouts, and the loads behind them.
 
-Layouts have many pieces in common, and what a piece does to a point depends on no other piece. So
-each piece is computed once per charge.
+Layouts have many pieces in common, and what a piece says to a point depends on no other piece. So
+each piece is computed once per charge; how much it counts, once per layout.
 
 Most charges and pieces of training are never met again. What is known of them is kept from the
 second time on, that of pieces from the fifth; before, it is in room that the next charge takes.
@@ -87,11 +87,11 @@ def log_loads_of(
             room("base", (members, whole(points), width), SINGLE),
             Pieces.in_room(points, layers, Room(), 0),
             Pieces.in_room(points, layers, room, most),
-            Bench.in_room(points, structures, layers, room, most),
+            Bench.in_room(points, structures, layers, room, most, max(counts)),
             room("numbers", (most + 1,), INTEGER),
         )
 
-    arrays = room.together(("charges", points, structures, members, most), make)
+    arrays = room.together(("charges", points, structures, members, most, max(counts)), make)
     put_charges(asked, site, scales, layers, *arrays, found, farthest_m)
     for charge, away_m in zip(charges, farthest_m.tolist(), strict=True):
         check_within_curves(away_m, charge)
@@ -126,7 +126,7 @@ class PieceKnowledge:
         self._start_m = np.array(start_m)
         self._own = ApproachArrays.in_room(self._points, structures, room)
         self._base = room("base", (members, whole(self._points), width), SINGLE)
-        bench = Bench.in_room(self._points, structures, layers, Room(), 0)
+        bench = Bench.in_room(self._points, structures, layers, Room(), 0, 0)
         farthest_m = put_charge(
             *(self._start_m, self._scale_m, fall_m, site, scales, layers),
             *(self._own, self._base, bench),
@@ -156,11 +156,11 @@ class PieceKnowledge:
         found: Numbers = np.zeros((len(layouts), max(map(len, layouts)) + 1), dtype=np.int32)
         for own, boxes in zip(found, layouts, strict=True):
             own[: len(boxes)] = [numbers.get(box) or of_new[box] for box in boxes]
-        sizes = self._points, len(site.solids), len(self._base), len(new)
+        sizes = (self._points, len(site.solids), len(self._base), len(new), found.shape[1])
 
         def make(room: Room) -> tuple[Bench, Pieces]:
-            points, structures, _, pieces = sizes
-            bench = Bench.in_room(points, structures, self._layers, room, pieces)
+            points, structures, _, pieces, most = sizes
+            bench = Bench.in_room(points, structures, self._layers, room, pieces, most)
             return bench, Pieces.in_room(points, self._layers, room, pieces)
 
         bench, fresh = room.together(("pieces", *sizes), make)
@@ -172,7 +172,8 @@ class PieceKnowledge:
         # 2. The loads, and 3. pieces met for the fifth time are kept.
         loads = np.empty((len(self._base), len(layouts), len(site.points.starts)))
         put_loads(
-            *(found, site.points, self._scales, self._layers, self._own, self._base),
+            *(found, self._start_m, self._scale_m, site, self._scales, self._layers),
+            *(self._own, self._base),
             *(self._pieces, fresh, bench, 0, loads),
         )
         self._keep(new, fresh)
@@ -188,6 +189,7 @@ class PieceKnowledge:
             return
         first, kept = len(self._numbers), self._pieces
         self._pieces = Pieces(
+            _with(kept.boxes, fresh.boxes[again], first),
             _with(kept.stopped, fresh.stopped[again], first),
             _with(kept.is_open, fresh.is_open[again], first),
             _with(kept.messages, fresh.messages[:, again], first, axis=1),

@@ -8,11 +8,13 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.layers import SingleArray
+from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import site_of
@@ -43,6 +45,7 @@ class Samples:
         features: Features of all points (points, FEATURES).
         relations: Relations of solids to points, ordered by sample, solid and point
             (rows, RELATIONS).
+        traits: Traits of pieces, ordered by sample and piece (pieces, TRAITS).
         area_m2: Wall area represented by each point (points,).
         counts: Number of points of each sample (samples,).
         solids: Number of structures and pieces of each sample (samples,).
@@ -57,6 +60,7 @@ class Samples:
 
     features: FloatArray
     relations: FloatArray
+    traits: FloatArray
     area_m2: FloatArray
     counts: np.ndarray
     solids: np.ndarray
@@ -71,6 +75,12 @@ class Samples:
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.counts)
+
+    @property
+    def pieces(self) -> IntArray:
+        """Number of pieces of each sample (samples,)."""
+        found: IntArray = self.solids - self.structures
+        return found
 
     @classmethod
     def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
@@ -90,6 +100,7 @@ class Samples:
         # 1. Each site once; each blast once, with the features of all points of its walls.
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
         features, related, area_m2, impulses, peaks = [], [], [], [], []
+        traits: list[SingleArray] = []
         standing: list[int] = []
         wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
         columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
@@ -101,12 +112,14 @@ class Samples:
             barrier = site.barrier(elements(layout))
             of_points = approach.features(barrier).astype(np.float32)
             of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
+            of_pieces = site.traits(approach, barrier).astype(np.float32)
             names = [structure.name for structure in site.protected]
             # 2. Of these, the points of each protected structure: a sample.
             for *_, structure in loads:
                 own = approach.points_of(names.index(structure))
                 features.append(of_points[own])
                 related.append(of_solids[:, own].astype(np.float32))
+                traits.append(of_pieces)
                 standing.append(len(approach.solids))
                 area_m2.append(approach.area_m2[own])
                 impulses.append(approach.log_impulse[own])
@@ -116,6 +129,7 @@ class Samples:
         return cls(
             features=np.concatenate(features),
             relations=np.concatenate([thing.reshape(-1, RELATIONS) for thing in related]),
+            traits=np.concatenate([own.reshape(-1, TRAITS) for own in traits]),
             area_m2=np.concatenate(area_m2),
             counts=np.array([len(feature) for feature in features]),
             solids=np.array([len(thing) for thing in related]),

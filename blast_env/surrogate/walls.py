@@ -20,6 +20,7 @@ from blast_env.site.facade import BayComponents
 from blast_env.site.terraces import ground_below_m, is_open_below
 from blast_env.surrogate.approach import Approach, curves
 from blast_env.surrogate.loads import SiteArrays
+from blast_env.surrogate.neighbours import piece_traits
 from blast_env.surrogate.pieces import Box, Memory
 from blast_env.surrogate.points import WallPoints
 
@@ -89,6 +90,10 @@ class SurrogateSite:
                 self._approaches.popitem(last=False)
         self._approaches.move_to_end(charge)
         return self._approaches[charge]
+
+    def traits(self, approach: Approach, barrier: FloatArray) -> FloatArray:
+        """Return the traits of the pieces of a barrier against a charge (pieces, TRAITS)."""
+        return piece_traits(approach.ways.start_m, approach.scale_m, self._solids, barrier)
 
     def bay_damages(
         self, structure: str, peak_pa: float, impulse_pa_s: float

@@ -442,7 +442,7 @@ def _stop(
             if far_m < -_DOUBT_M or near_m > way_m + _DOUBT_M:
                 continue
             number, height_m = min(solid, len(stopped) - 1), solids[solid, 4]
-            enter, leave = _cut(start_x_m, start_y_m, end_x_m, end_y_m, solids, solid)
+            enter, leave = cut(start_x_m, start_y_m, end_x_m, end_y_m, solids, solid)
             for point in range(first, last if enter < leave else first):
                 rise_m, is_open = points_m[point, 2] - start_z_m, is_straight_open[number, point]
                 if is_open and _lowest_m(start_z_m, rise_m, enter, leave) < height_m:
@@ -468,9 +468,9 @@ def _stop(
                     x_m, y_m = by_m[first, station, aside, 0], by_m[first, station, aside, 1]
                     enter, leave, enters, leaves = 1.0, 0.0, 1.0, 0.0
                     if may_there:
-                        enter, leave = _cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
+                        enter, leave = cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
                     if may_on:
-                        enters, leaves = _cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
+                        enters, leaves = cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
                     clears, clears_on = enter >= leave, enters >= leaves
                     if clears and clears_on:
                         continue
@@ -527,7 +527,7 @@ def _span(
 
 
 @njit(error_model="numpy")
-def _cut(
+def cut(
     start_x_m: float,
     start_y_m: float,
     end_x_m: float,
