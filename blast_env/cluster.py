@@ -203,6 +203,7 @@ class ClusterBackend(ParallelBackendBase):
         self._client = client
         self._sent: OrderedDict[int, _Sent] = OrderedDict()
         self._counted_s, self._count = -inf, 0
+        self._fetched_before: list[Future] = []
         self.work_bytes = 0
         self.section_bytes: list[int] = []
 
@@ -234,11 +235,15 @@ class ClusterBackend(ParallelBackendBase):
                     under_way[index] = future
                     future.add_done_callback(partial(_note, done, index))
                 submitted += len(some)
+                if some:  # only now: a client says at once what comes first, the rest 10 ms later
+                    self._fetched_before.clear()
                 # Waits for one, then takes all that are there: one message fetches many results.
                 taken = [done.get()]
                 while not done.empty():
                     taken.append(done.get())
-                found = self._fetched([under_way.pop(index) for index, _ in taken])
+                futures = [under_way.pop(index) for index, _ in taken]
+                self._fetched_before += futures
+                found = self._fetched(futures)
                 yield from zip([index for index, _ in taken], found, strict=True)
         finally:
             if under_way:
