@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import torch
 import typer
-from matplotlib.figure import Figure
 
 from blast_env.answers.terminal import print_line
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -25,7 +24,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.site import Catalogue, Scenario
 from blast_env.statistics import Estimate, mean_estimate
 from blast_env.units import PA_PER_PSI
-from studies.first_hour import HELD_OUT, Curve, Setting, reductions, trained
+from studies.first_hour import HELD_OUT, Curve, Setting, picture, reductions, trained
 
 
 @dataclass(frozen=True)
@@ -118,29 +117,6 @@ def _shape(catalogue: Catalogue) -> tuple[int, int, int]:
     return len(catalogue.variants), *catalogue.shape
 
 
-def picture(curves: Mapping[str, Curve], random: float) -> Figure:
-    """Return a figure of the reductions in training over its steps, means of 100 episodes.
-
-    Args:
-        curves: What each training met, by its name.
-        random: The mean reduction by random legal actions.
-    """
-    figure = Figure(figsize=(7.5, 4.0), layout="constrained")
-    axes = figure.subplots()
-    for name, curve in curves.items():
-        kernel = np.full(min(_EPISODES, len(curve.steps)), 1.0) / min(_EPISODES, len(curve.steps))
-        means = np.convolve(100.0 * np.array(curve.reductions), kernel, mode="valid")
-        axes.plot(curve.steps[len(kernel) - 1 :], means, label=name)
-    axes.axhline(100.0 * random, color="0.5", linestyle="--", label="random legal actions")
-    axes.set_xlabel("steps of the training")
-    axes.set_ylabel("load taken off (%)")
-    axes.legend(fontsize="small")
-    return figure
-
-
-_EPISODES: Final = 100
-
-
 def main(
     steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 10_240,
     scenario: Annotated[str, typer.Option(help="The site.")] = "control_room",
@@ -168,7 +144,7 @@ def main(
         means = [100.0 * reductions(env, agent, judged).mean() for agent in agents]
         print_line(f"{name}: {', '.join(f'{mean:.1f}' for mean in means)} %")
     if out is not None:
-        save_figure(picture(curves, float(random)), out)
+        save_figure(picture(curves, {"random legal actions": float(random)}), out)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from time import process_time
 from typing import Annotated, Any, Final
 
@@ -16,6 +17,7 @@ import typer
 from blast_agents import packaged_agent
 from blast_agents.training import BatchVecEnv
 from blast_agents.training.environments import ThreatPool
+from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -30,6 +32,7 @@ from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import BlastStore
 from blast_env.layout import charge_against
+from blast_env.plots.figures import save_figure
 from blast_env.site import AnyCharge, Charge, Scenario, VehicleCharge, VehicleSource
 from blast_env.sites import FAMILIES, Ranges, SiteSource
 from blast_env.statistics import mean_estimate
@@ -40,6 +43,9 @@ HELD_OUT: Final = range(10_000, 10_048)
 RANDOM: Final = "random"
 
 SUGGESTED: Final = "random suggestions"
+
+_EPISODES: Final = 100
+"""Episodes in a mean of a curve."""
 
 ROLLOUT: Final = 2048
 """Steps of a rollout, the default of both algorithms for one environment."""
@@ -133,6 +139,27 @@ class Curve(BaseCallback):
                 self.steps.append(self.num_timesteps)
                 self.reductions.append(info["reduction"])
         return True
+
+
+def picture(curves: Mapping[str, Curve], levels: Mapping[str, float]) -> Figure:
+    """Return a figure of the reductions in training over its steps, means of 100 episodes.
+
+    Args:
+        curves: What each training met, by its name.
+        levels: Mean reductions of what does not learn, by its name.
+    """
+    figure = Figure(figsize=(7.5, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for name, curve in curves.items():
+        kernel = np.full(min(_EPISODES, len(curve.steps)), 1.0) / min(_EPISODES, len(curve.steps))
+        means = np.convolve(100.0 * np.array(curve.reductions), kernel, mode="valid")
+        axes.plot(curve.steps[len(kernel) - 1 :], means, label=name)
+    for (name, level), style in zip(levels.items(), ("--", ":", "-."), strict=False):
+        axes.axhline(100.0 * level, color="0.5", linestyle=style, label=name)
+    axes.set_xlabel("steps of the training")
+    axes.set_ylabel("load taken off (%)")
+    axes.legend(fontsize="small")
+    return figure
 
 
 def trained(
@@ -234,6 +261,15 @@ class Judgement:
         """The reductions by the best rule of each threat, which takes blasts of all to know."""
         best: FloatArray = np.max([*self.rules.values()], axis=0)
         return best
+
+    @property
+    def levels(self) -> dict[str, float]:
+        """The mean reductions of what does not learn."""
+        random = {"random legal actions": self.random}
+        if SUGGESTED in self.others:
+            random[SUGGESTED] = self.others[SUGGESTED]
+        shown = {"the best rule": self.best_rule, **random}
+        return {name: float(item.mean()) for name, item in shown.items()}
 
     def of(self, algorithm: str) -> FloatArray:
         """Return the reductions by the agents of an algorithm (agents, threats)."""
@@ -339,6 +375,9 @@ def main(
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
     by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 12,
     cache: Annotated[str | None, typer.Option(help="Folder for the blasts of gas.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Picture of the first training of each algorithm.")
+    ] = None,
 ) -> None:
     """Train, and judge on held-out threats: a line for each method, then a row for each site."""
     torch.set_num_threads(1)
@@ -346,10 +385,12 @@ def main(
     for site in scenario or ["courtyard"]:
         setting = Setting(site, engine, reward, action, envs)
         agents: dict[str, Agent] = {}
+        curves: dict[str, Curve] = {}
         for kind in algorithm or KNOWN:
             for seed in range(seeds):
                 began_s = process_time()
-                agent = trained(kind, setting, steps, seed)
+                curve = curves.setdefault(kind, Curve()) if seed == 0 else None
+                agent = trained(kind, setting, steps, seed, curve)
                 agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
         for judge, count, kept in ((setting.training, threats, None), (gas, by_gas, cache)):
             if count:
@@ -357,6 +398,8 @@ def main(
                 for line in judgement.lines():
                     print_line(line)
                 rows.append(judgement.row())
+                if out is not None and judge is not gas:
+                    save_figure(picture(curves, judgement.levels), out)
     print_table("reduction, %", HEADERS, rows, 2)
 
 
