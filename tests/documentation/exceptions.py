@@ -227,10 +227,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
     " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",
     "blast-env judge --scenario item_sites --scenario kerb_sites --cases 30 --budget 0 --budget 10"
-    " --method rules --method agent --method surrogate --out out/entry": (
-        "--cases 1 --budget 0 --cell 0.5"
-    ),
-    "blast-env judge --scenario item_sites --scenario kerb_sites --cases 3 --budget 0 --budget 10"
     " --cell 0.5 --method rules --method agent --method surrogate --out out/entry": (
         "--cases 1 --budget 0"
     ),
