@@ -137,13 +137,13 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.first_hour --reward relative --action row": (
         "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0"
     ),
-    "python -m studies.first_hour --engine surrogate --action suggestion --envs 8 --threats 24"
+    "python -m studies.first_hour --engine surrogate --action suggestion --threats 24"
     " --by-gas 6 --scenario courtyard --scenario control_room --scenario visitor_entrance"
     " --scenario hotel_forecourt --scenario school_and_clinic": (
         "--steps 64 --seeds 1 --threats 2 --by-gas 0"
     ),
     "python -m studies.first_hour --engine surrogate --action suggestion --envs 8 --algorithm"
-    " MaskablePPO --steps 40960 --seeds 1 --threats 48 --by-gas 12 --scenario item_sites": (
+    " MaskablePPO --steps 40960 --seeds 1 --threats 48 --by-gas 24 --scenario item_sites": (
         "--steps 64 --threats 2 --by-gas 0"
     ),
     "python -m studies.first_hour --engine gas --algorithm MaskablePPO --scenario visitor_entrance"
