@@ -38,7 +38,9 @@ COLUMNS: Final = (
     Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),
     Column("tnt_kg", "kg", "its mass"),
     Column("structure", "", "name of the structure", True),
-    Column("protected", "", "whether its load counts"),
+    Column(
+        "protected", "", "whether its load counts; other loads are cut off where those are known"
+    ),
     Column("impulse_pa_s", "Pa s", "mean impulse on the assessed walls"),
     Column("peak_pa", "Pa", "largest overpressure on them"),
     Column("unprotected_impulse_pa_s", "Pa s", "the same blast without a barrier; else missing"),
