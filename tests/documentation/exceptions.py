@@ -206,7 +206,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.blast_table blasts --kind square_sites --sites 100 --out blasts.parquet": (
         "--sites 1"
     ),
-    "python -m studies.learning_curve": (
+    "python -m studies.learning_curve --epochs 16": (
         "--data docs/data/close_site_blasts.parquet --other docs/data/many_site_blasts.parquet"
         " --epochs 1 --share 1.0"
     ),
