@@ -21,7 +21,6 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark.methods import reference_of
 from blast_env.benchmark.references import cell_key
-from blast_env.design import random_layout
 from blast_env.design.search import find_proposer
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastStore, BudgetError
@@ -30,6 +29,7 @@ from blast_env.evaluation.validation import worst_validation
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
 from blast_env.layout.placement import load_relevant
+from blast_env.rules import random_layout
 from blast_env.sections import digest_of
 from blast_env.surrogate import Surrogate, SurrogateSite, packaged_surrogate, site_of
 from blast_env.tools.guesses import guessed_shares

@@ -5,11 +5,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from blast_env.benchmark import BenchmarkProblem
-from blast_env.design import random_layout
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
+from blast_env.rules import random_layout
 from blast_env.site import Scenario, VehicleCharge
 from blast_env.tools.records import (
     Building,

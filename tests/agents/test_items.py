@@ -5,14 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.design import (
-    line_of_sight_wall,
-    random_layout,
-    ring_around_building,
-    ring_around_charge,
-    wall_near_building,
-    wall_near_charge,
-)
 from blast_env.design.search import (
     DesignProblem,
     Layout,
@@ -32,6 +24,14 @@ from blast_env.design.search import (
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
+from blast_env.rules import (
+    line_of_sight_wall,
+    random_layout,
+    ring_around_building,
+    ring_around_charge,
+    wall_near_building,
+    wall_near_charge,
+)
 from blast_env.site import Charge, Scenario
 from tests.agents.sites import site
 from tests.catalogue_sites import ITEMS, item, yard

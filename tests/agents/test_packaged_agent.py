@@ -19,13 +19,13 @@ from typer.testing import CliRunner
 
 from blast_env import load_scenario
 from blast_env.cli import app
-from blast_env.design import expected_charge, random_layout
 from blast_env.design.proposal import problem_of
 from blast_env.design.search import Guesses, layouts_by_rule, search_by
 from blast_env.design.search.package import LEAST_GAIN
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.layout import LayoutState, draw_threat, load_layout
+from blast_env.rules import expected_charge, random_layout
 from blast_env.site import AnyCharge, Charge, Scenario
 from blast_env.sites import ItemSiteRanges, generate_site, kerb_site, turned
 from blast_env.surrogate import packaged_surrogate

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from blast_env.design import random_layout
 from blast_env.design.search import Search, SearchSession
+from blast_env.rules import random_layout
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from blast_env.app import offers
 from blast_env.benchmark import SubmissionJudgement, make, play
 from blast_env.benchmark.methods import find_method
 from blast_env.cli import app
-from blast_env.design import random_layout
 from blast_env.design.search import (
     DesignProblem,
     ProposerKind,
@@ -26,7 +25,7 @@ from blast_env.design.search import (
     registry,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.rules import RuleRow, table
+from blast_env.rules import RuleRow, random_layout, table
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner

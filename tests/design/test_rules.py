@@ -9,7 +9,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blast_env.design import (
+from blast_env.design.by_atlas import WORSE
+from blast_env.design.proposal import problem_of
+from blast_env.design.search import find_proposer, layouts_by_rule
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import draw_threats
+from blast_env.geometry import Layout, Piece
+from blast_env.layout import LayoutState, check_layout, worst_places
+from blast_env.rules import (
     NEAR_BUILDING,
     NEAR_CHARGE,
     expected_charge,
@@ -21,13 +28,6 @@ from blast_env.design import (
     wall_near_charge,
     why_no_wall,
 )
-from blast_env.design.by_atlas import WORSE
-from blast_env.design.proposal import problem_of
-from blast_env.design.search import find_proposer, layouts_by_rule
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import draw_threats
-from blast_env.geometry import Layout, Piece
-from blast_env.layout import LayoutState, check_layout, worst_places
 from blast_env.site import Charge, PointSource, RectangleSource, Scenario, load_scenario
 from blast_env.sites import close_ranges, generate_site
 from tests.agents.sites import site

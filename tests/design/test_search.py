@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env import load_scenario
-from blast_env.design import random_layout
 from blast_env.design.search import (
     Layout,
     Moves,
@@ -23,6 +22,7 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
+from blast_env.rules import random_layout
 from blast_env.site import Charge, ConditionalValueAtRisk, MeanRisk
 from tests.agents.sites import site
 from tests.design.search_cases import ballistic, small_problem, small_scenario

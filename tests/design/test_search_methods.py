@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from blast_env.design import wall_near_charge
 from blast_env.design.search import (
     DesignProblem,
     GeneticSearch,
@@ -25,6 +24,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
+from blast_env.rules import wall_near_charge
 from blast_env.site import AnyCharge, Charge, Scenario
 from tests.design.search_cases import (
     WatchedEvaluator,

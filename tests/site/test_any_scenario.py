@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import blast_env
-from blast_env.design import random_layout, wall_near_charge
 from blast_env.design.search import layouts_by_rule
 from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCase, LoadCaseSet, draw_threats
 from blast_env.io.export import LayoutPlan
 from blast_env.layout import LayoutFile, LayoutState, check_layout, usable_cells
+from blast_env.rules import random_layout, wall_near_charge
 from blast_env.site import Charge
 from blast_env.sites import SiteMeasures, turned
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.design import hardening_alone, hardening_and_sight_lines
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import LayoutError
 from blast_env.geometry import Measure, Piece, layout_counts, layout_words, standing
 from blast_env.io.export import LayoutPlan, bill_of_quantities, element_table
 from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.plots import barrier_features
+from blast_env.rules import hardening_alone, hardening_and_sight_lines
 from blast_env.site import Scenario, ScenarioError
 from tests.catalogue_sites import WALL, yard_document
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from blast_env import bundled_scenarios, load_scenario
-from blast_env.design import random_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.gas import CHECKED_CELLS
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import LayoutState, worst_places
+from blast_env.rules import random_layout
 from blast_env.site import Scenario
 
 WITH_HEIGHTS = [name for name in bundled_scenarios() if load_scenario(name).height_notes]

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import studies.surrogate
-from blast_env.design import random_layout
 from blast_env.design.search import (
     DesignProblem,
     Guesses,
@@ -32,6 +31,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_thr
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState, draw_threat
+from blast_env.rules import random_layout
 from blast_env.site import AnyCharge, Charge, Scenario, load_scenario
 from blast_env.surrogate import (
     ABOVE_M,

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from blast_env.design import line_of_posts
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutState, vehicle_drive, worst_places
+from blast_env.rules import line_of_posts
 from blast_env.sections import Site
 from blast_env.site import Scenario, ScenarioError, VehicleSource, loaded_walls
 from blast_env.vehicles import (

@@ -12,11 +12,11 @@ from ezdxf.entities.mtext import MText
 from ezdxf.filemanagement import readfile
 
 from blast_env import load_scenario
-from blast_env.design import random_layout
 from blast_env.geometry import Rectangle
 from blast_env.io.export import LayoutPlan, export_layout, key_of, note_lines, texts_of
 from blast_env.layout import LayoutState
 from blast_env.plots import Kinds
+from blast_env.rules import random_layout
 from blast_env.site import Charge, Scenario
 
 GATE = load_scenario("perimeter_gate")  # a clearance and an access way
