@@ -57,7 +57,7 @@ from blast_env.design.search import (
 from blast_env.design.search.by_rule import DEFAULT_BUDGET, ProposerKind
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.registry import check_suits, proposer_row
-from blast_env.envs.episode import find_risk
+from blast_env.envs.strategies import find_risk
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     Evaluation,

@@ -7,7 +7,7 @@ from typing import Final
 from blast_env.design.search.package import PackageProposer
 from blast_env.design.search.problem import Report, SearchResult
 from blast_env.design.search.registry import find_proposer, proposer_row
-from blast_env.envs.episode import find_realisations
+from blast_env.envs.strategies import find_realisations
 from blast_env.evaluation import (
     BlastEvaluator,
     DesignProblem,

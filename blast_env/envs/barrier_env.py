@@ -18,16 +18,7 @@ from blast_env.envs.arguments import (
     checked_keywords,
     strategy,
 )
-from blast_env.envs.episode import (
-    INVALID_ACTIONS,
-    Episode,
-    Episodes,
-    IllegalActions,
-    Task,
-    find_realisations,
-    find_risk,
-    find_threat_model,
-)
+from blast_env.envs.episode import INVALID_ACTIONS, Episode, Episodes, IllegalActions, Task
 from blast_env.envs.observable import MASK, Observable, Observation, one_of
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.envs.strategies import (
@@ -36,6 +27,9 @@ from blast_env.envs.strategies import (
     Reward,
     ScenarioSource,
     ThreatModel,
+    find_realisations,
+    find_risk,
+    find_threat_model,
     scenario_source,
 )
 from blast_env.errors import value_text

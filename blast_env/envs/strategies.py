@@ -1,4 +1,4 @@
-"""Strategies with names: threat models, sources of scenarios, rewards."""
+"""Strategies with names: threat models, sources of scenarios, rewards, risk measures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,9 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.bundled import GENERATED
+from blast_env.envs.arguments import strategy
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import Assessment
 from blast_env.geometry import Layout
 from blast_env.site import (
@@ -22,7 +24,9 @@ from blast_env.site import (
     Scenario,
     find_scenario,
 )
+from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.site.sources import source_of
+from blast_env.values import real_number, whole_number
 
 
 class ThreatModel(Protocol):
@@ -73,6 +77,46 @@ class HiddenThreat:
     ) -> tuple[AnySource, ...]:
         """Return the sources of the scenario, without the charges drawn."""
         return scenario.charge
+
+
+VISIBLE_REALISATIONS: Final = 2
+"""Default number of blasts for a visible charge."""
+
+HIDDEN_THREATS: Final = 16
+"""Default number of charges for a hidden threat, one blast each."""
+
+
+def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatModel:
+    """Return the threat model for the arguments `threat` and `threats`.
+
+    Raises:
+        UnknownNameError: If there is no threat model of that name.
+        BlastEnvError: If the number of threats is out of bounds, or is not 1 for a threat model
+            other than `"hidden"`.
+    """
+    count = HIDDEN_THREATS if threats is None else whole_number("threats", threats, 1, 1000)
+    models: dict[str, ThreatModel] = {"visible": VisibleThreat(), "hidden": HiddenThreat(count)}
+    chosen = strategy("threat", threat, models)
+    if threats not in (None, 1) and threat != "hidden":
+        raise BlastEnvError(f"threats is {threats}, must be 1 unless threat is 'hidden'")
+    return chosen
+
+
+def find_realisations(realisations: int | None, threat: str | ThreatModel, engine: Engine) -> int:
+    """Return the number of blasts per charge for the arguments `realisations` and `threat`.
+
+    Raises:
+        BlastEnvError: If the number is out of bounds; it must be 1 for an engine without noise.
+    """
+    if not engine.has_noise:
+        if realisations not in (None, 1):
+            raise BlastEnvError(
+                f"realisations is {realisations}, must be 1: {engine.name} has no noise"
+            )
+        return 1
+    if realisations is None:
+        return VISIBLE_REALISATIONS if threat == "visible" else 1
+    return whole_number("realisations", realisations, 1, 1000)
 
 
 class ScenarioSource(Protocol):
@@ -349,3 +393,21 @@ REWARDS: Final[Mapping[str, Reward | EndReward]] = MappingProxyType(
     }
 )
 """The rewards, by their names."""
+
+
+def find_risk(risk: str | Risk | None, cvar_level: float) -> Risk | None:
+    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none.
+
+    Raises:
+        UnknownNameError: If there is no risk measure of that name.
+        BlastEnvError: If the level is not a number or is out of bounds.
+    """
+    level = real_number("cvar_level", cvar_level, 0.0, 1.0)
+    if risk is None:
+        return None
+    measures: dict[str, Risk] = {
+        "mean": MeanRisk(),
+        "cvar": ConditionalValueAtRisk(level),
+        "worst": WorstRisk(),
+    }
+    return strategy("risk", risk, measures)
