@@ -67,6 +67,32 @@ def test_the_first_blast_of_an_installation_gives_it(tmp_path: Path) -> None:
     assert "surrogate" in told[1]
 
 
+COMPILED_AGAIN = """
+import sys
+from numba.core import event
+from blast_env import evaluate_layout
+
+class Telling(event.Listener):
+    def on_start(self, event):
+        print(event.data["dispatcher"].py_func.__qualname__)
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Telling())
+for engine in sys.argv[1:]:
+    evaluate_layout("courtyard", [(0, 0)], seeds=range(1), engine=engine)
+"""
+
+
+def test_a_later_process_compiles_nothing() -> None:
+    for _ in range(3):  # tests beside this one may keep theirs at the same time
+        arguments = [sys.executable, "-c", COMPILED_AGAIN, "event", "surrogate"]
+        told = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
+        if not told:
+            return
+    pytest.fail(f"compiled in each process: {told}")
+
+
 # --- Compiled code is kept until one of its sources changes, in whichever file that is.
 
 

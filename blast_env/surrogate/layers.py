@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from blast_env.compilation import compiled
@@ -185,7 +186,7 @@ def two_layers(
     return found[:, : rows.shape[1]]
 
 
-@njit(error_model="numpy")
+@register_jitable
 def whole(rows: int) -> int:
     """Return a number of rows, rounded up to a multiple of those that pass together."""
     return -(-rows // ROWS_AT_ONCE) * ROWS_AT_ONCE
