@@ -2,10 +2,12 @@
 
     python -m studies.packaged_agent show --out out/packaged/shown.jsonl
     python -m studies.packaged_agent train out/packaged/shown.jsonl
+    python -m studies.packaged_agent train --visits 1500
     python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 20
 
-The first line searches by guesses on generated sites of the seeds of training; the second fits the
-policy to the layouts that it found; the third compares proposals and rules on held-out sites.
+The first line searches by guesses on generated sites of the seeds of training. The second has a
+policy imitate the layouts, and then learn from its own draws. The third goes on so from the
+package's weights. The last one compares proposals and rules on held-out sites.
 """
 
 import json
@@ -15,13 +17,14 @@ from functools import partial
 from pathlib import Path
 from statistics import fmean, median
 from time import process_time
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 import torch
 import typer
 from blast_agents.packaged import (
     DRAWS,
+    FEW_DRAWS,
     CandidateNetwork,
     PackagedAgent,
     Weights,
@@ -29,37 +32,34 @@ from blast_agents.packaged import (
     packaged_agent,
     write_weights,
 )
-from blast_agents.policies.candidates import CHANGING, STATIC, Candidates, Standing
-from numpy.typing import NDArray
-from torch import Tensor
 
 from blast_env.answers.terminal import print_line
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, case_for, improved
 from blast_env.design.search.package import PackageProposer
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.files import make_folder
-from blast_env.geometry import Layout, Piece
-from blast_env.layout import LayoutState
 from blast_env.runner import run_all
-from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate import Surrogate, packaged_surrogate
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
+from studies.packaged_training import VISITS, Examples, charge_of, fitted, reinforced
 from studies.site_names import scenario_of
 from studies.surrogate import promise, reductions_of
 
 SHOWN_KINDS: Final = {
-    "item_sites": (3, 10_079),
+    "item_sites": (4, 10_079),
     "kerb_sites": (3, 10_400),
     "close_sites/16": (1, 10_000),
     "front_sites/18": (1, 10_075),
     "close_sites/20": (1, 10_000),
     "front_sites/16": (1, 10_107),
+    "street_sites": (1, 10_000),
+    "court_sites": (1, 10_000),
+    "square_sites": (1, 10_000),
     "sites": (1, 10_000),
 }
 """Sites of each kind in a round of the training, and the seed of the first one.
@@ -70,61 +70,70 @@ Many of them are sites of the surrogate's fit, where its guesses are best.
 FIRST_JUDGED: Final = 8_000
 """First of the held-out seeds that judge the agent and nothing else."""
 
-_HIDDEN_EVERY: Final = 3
+CHECKED_ROUND: Final = 1_000
+"""Round of the first case that checks a training."""
+
+WIDTH: Final = 32
+"""Width of the hidden layers."""
+
+_HIDDEN_EVERY: Final = 5
 """One of so many cases has a hidden charge."""
 
 _BEST: Final = 8
 """Layouts kept of each search."""
 
-PARTS: Final = 20
-"""Decisions of each case that the policy imitates."""
+SHOWN_DRAWS: Final = 16
+"""Draws of the agent that a search begins with."""
 
-TEMPERATURE: Final = 0.01
-"""Difference of two shares of the load by which a layout is 2.7 times likelier to be imitated."""
-
-SEEN: Final = 256
-"""Candidates of a decision that the training looks at: the wanted ones, and others at random."""
-
-BATCH: Final = 64
-RATE: Final = 3e-3
+_PART: Final = 28
+"""Cases that are written at once."""
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 
-def shown_cases(rounds: int) -> list[tuple[str, bool]]:
-    """Return the name of the site of each case, and whether its charge is known."""
+def shown_cases(count: int, first: int = 0) -> list[tuple[str, bool]]:
+    """Return the name of the site of each case, and whether its charge is known.
+
+    Args:
+        count: Number of cases.
+        first: Number of rounds that are left out.
+    """
     cases: list[tuple[str, bool]] = []
-    for number in range(rounds):
-        for kind, (count, first) in SHOWN_KINDS.items():
-            names = [f"{kind}/{first + number * count + k}" for k in range(count)]
+    number = first
+    while len(cases) < count:
+        for kind, (own, begin) in SHOWN_KINDS.items():
+            names = [f"{kind}/{begin + number * own + k}" for k in range(own)]
             cases += [(name, (len(cases) + k) % _HIDDEN_EVERY > 0) for k, name in enumerate(names)]
-    return cases
+        number += 1
+    return cases[:count]
 
 
 def best_by_guesses(
-    surrogate: Surrogate,
-    name: str,
-    known: bool,
-    changes: int,
-    agent_layouts: tuple[Layout, ...] = (),
+    surrogate: Surrogate, changes: int, agent: PackagedAgent | None, case: tuple[str, bool]
 ) -> dict[str, Any]:
     """Return the best layouts of a search by guesses alone, and by how much they lower the load.
 
     Args:
         surrogate: The surrogate.
-        name: Name of the site, as in `studies.site_names`.
-        known: Whether the charge is known: the first one of training.
         changes: Number of changed layouts.
-        agent_layouts: Layouts that the search begins with, besides those of the rules.
+        agent: An agent whose draws it begins with, and which changes layouts, too. Without one it
+            begins with the rules' layouts alone.
+        case: Name of the site, as in `studies.site_names`, and whether its charge is known: the
+            first one of training.
     """
+    name, known = case
     scenario = scenario_of(name)
-    charge = draw_threats(scenario, [0])[0].charge if known else None
-    guesses = Guesses.of(surrogate, case_for(scenario, charge))
-    rules = layouts_by_rule(scenario, charge)
-    begin_with = [(), *rules.values(), *agent_layouts]
+    charge = charge_of(scenario, known)
+    guesses, rules = (
+        Guesses.of(surrogate, case_for(scenario, charge)),
+        layouts_by_rule(scenario, charge),
+    )
     seed = int(name.rpartition("/")[-1])
-    found = improved(guesses, begin_with, changes, np.random.default_rng([seed, int(known)]))
-    best = found[:_BEST]
+    if agent is None:
+        rng = np.random.default_rng([seed, int(known)])
+        best = improved(guesses, [(), *rules.values()], changes, rng)[:_BEST]
+    else:
+        best = agent.searched(guesses, charge, rules, SHOWN_DRAWS, changes, seed)[:_BEST]
     unprotected, *loads = guesses.loads([(), *best]).tolist()
     shares = reductions(np.array(loads), np.full(len(loads), unprotected))
     ruled = guesses.loads([tuple(sorted(rule)) for rule in rules.values()])
@@ -143,20 +152,28 @@ def show(
     out: Annotated[Path, typer.Option(help="File of the layouts; it goes on with it.")] = Path(
         "out/packaged/shown.jsonl"
     ),
-    rounds: Annotated[int, typer.Option(min=1, help="Rounds of eleven sites.")] = 40,
-    changes: Annotated[int, typer.Option(min=0, help="Changed layouts of a search.")] = 300,
+    count: Annotated[int, typer.Option(min=1, help="Number of cases.")] = 840,
+    changes: Annotated[int, typer.Option(min=0, help="Changed layouts of a search.")] = 200,
+    agent: Annotated[Path | None, typer.Option(help="Weights in place of the package's.")] = None,
+    from_rules: Annotated[
+        bool, typer.Option("--from-rules", help="Search without an agent, by moves alone.")
+    ] = False,
+    processes: Annotated[int, typer.Option(min=1)] = 1,
 ) -> None:
     """Search by guesses on the sites of training; keep the best layouts of each case."""
     with user_errors(), progress_bar("searches") as progress:
         make_folder(out.parent)
         done = {(case["site"], case["known"]) for case in read_shown(out)}
-        cases, surrogate = shown_cases(rounds), packaged_surrogate()
-        for number, (name, known) in enumerate(cases, start=1):
-            if (name, known) not in done:
-                line = json.dumps(best_by_guesses(surrogate, name, known, changes))
-                with out.open("a", encoding="utf-8") as file:
-                    file.write(line + "\n")
-            progress(number / len(cases))
+        cases = [case for case in shown_cases(count) if case not in done]
+        found = None if from_rules else packaged_agent() if agent is None else load_packaged(agent)
+        search = partial(best_by_guesses, packaged_surrogate(), changes, found)
+        # Parts in their order: an interruption loses one, and the file is the same for any number.
+        for start in range(0, len(cases), _PART):
+            part = cases[start : start + _PART]
+            lines = [json.dumps(case) + "\n" for case in run_all(search, part, processes)]
+            with out.open("a", encoding="utf-8") as file:
+                file.write("".join(lines))
+            progress((start + len(part)) / len(cases))
 
 
 def read_shown(path: Path) -> Iterator[dict[str, Any]]:
@@ -166,196 +183,128 @@ def read_shown(path: Path) -> Iterator[dict[str, Any]]:
             yield json.loads(line)
 
 
-@dataclass(frozen=True, eq=False)
-class Examples:
-    """Decisions to imitate: candidates after a random part of a good layout.
-
-    Attributes:
-        inputs: Features of candidates, static ones first (examples, seen, features).
-        wanted: Share of the target on each, and on finishing (examples, seen + 1).
-        log_weight: Logarithm of the number of candidates that each stands for; -inf for none
-            (examples, seen).
-        whole: Features of site and layout (examples, features).
-    """
-
-    inputs: NDArray[np.float16]
-    wanted: NDArray[np.float32]
-    log_weight: NDArray[np.float32]
-    whole: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, cases: Sequence[Mapping[str, Any]], seed: int, parts: int = PARTS) -> "Examples":
-        """Return the decisions on the way to the layouts of some cases.
-
-        A layout has no order: after any part of it, all remaining pieces are equally good next
-        ones, as in `blast_agents.training.imitation`. Only posts against vehicles come first.
-
-        Args:
-            cases: The cases, as `best_by_guesses` has them.
-            seed: Seed of the draws.
-            parts: Decisions of each case.
-        """
-        rng = np.random.default_rng(seed)
-        found: list[tuple[NDArray[Any], ...]] = []
-        for case in cases:
-            found += _decisions(case, rng, parts)
-        return cls(*(np.stack(part) for part in zip(*found, strict=True)))
-
-
-def layouts_of(case: Mapping[str, Any]) -> list[Layout]:
-    """Return the layouts of a case, the best first."""
-    return [
-        tuple(Piece(*element) if len(element) == 4 else (element[0], element[1]) for element in own)
-        for own in case["layouts"]
-    ]
-
-
-def _charge_of(scenario: Scenario, case: Mapping[str, Any]) -> AnyCharge | None:
-    return draw_threats(scenario, [0])[0].charge if case["known"] else None
-
-
-def _decisions(
-    case: Mapping[str, Any], rng: np.random.Generator, parts: int
-) -> Iterator[tuple[NDArray[Any], ...]]:
-    """Yield the arrays of an example for random parts of a case's layouts."""
-    scenario = scenario_of(case["site"])
-    candidates = Candidates.of(scenario, _charge_of(scenario, case))
-    catalogue = candidates.empty.catalogue
-    index_of = {number: index for index, number in enumerate(candidates.numbers.tolist())}
-    numbers = [[*map(catalogue.action, catalogue.layout_from(own))] for own in layouts_of(case)]
-    are_legal = np.array([all(number in index_of for number in own) for own in numbers])
-    if not are_legal.all():
-        print_line(f"{case['site']}: {sum(~are_legal)} of {len(numbers)} layouts are not legal")
-        return
-    layouts = [[index_of[number] for number in own] for own in numbers]
-    likely = np.exp((np.array(case["shares"]) - max(case["shares"])) / TEMPERATURE)
-    likely /= likely.sum()
-    is_post = candidates.is_post
-    for _ in range(parts):
-        layout = layouts[int(rng.choice(len(layouts), p=likely))]
-        # Posts come first: where a wall has taken their share of the budget, a way stays open.
-        order = sorted(rng.permutation(layout).tolist(), key=lambda own: not is_post[own])
-        count = int(rng.integers(len(layout) + 1))
-        state, rest = Standing(candidates), order[count:]
-        first = [own for own in rest if is_post[own]] or rest
-        wanted = np.array(first, dtype=np.int64)
-        for index in order[:count]:
-            state.add(index)
-        standing = [catalogue.element(int(candidates.numbers[index])) for index in order[:count]]
-        placement = LayoutState(scenario, tuple(standing))
-        if placement.is_full:
-            continue
-        is_legal = placement.legal.ravel()[candidates.numbers]
-        legal = np.flatnonzero(is_legal)
-        changing = state.features(legal)
-        whole = state.whole(legal, changing, placement.stock_left)
-        others = np.setdiff1d(legal, wanted)
-        shown = min(len(others), SEEN - len(wanted))
-        drawn = rng.choice(others, shown, replace=False)
-        chosen = np.concatenate((wanted, drawn)).astype(np.int64)
-        inputs = np.zeros((SEEN, len(STATIC) + len(CHANGING)), dtype=np.float16)
-        inputs[: len(chosen), : len(STATIC)] = candidates.static[chosen]
-        inputs[: len(chosen), len(STATIC) :] = changing[np.searchsorted(legal, chosen)]
-        targets = np.zeros(SEEN + 1, dtype=np.float32)
-        targets[: len(wanted)] = 1.0 / max(len(wanted), 1)
-        targets[SEEN] = len(wanted) == 0
-        log_weight = np.full(SEEN, -np.inf, dtype=np.float32)
-        log_weight[: len(wanted)] = 0.0
-        log_weight[len(wanted) : len(chosen)] = np.log(len(others) / max(shown, 1))
-        yield inputs, targets, log_weight, whole
-
-
-def fitted(examples: Examples, width: int, epochs: int, seed: int) -> Weights:
-    """Return the weights that imitate examples: the cross-entropy to the wanted candidates."""
-    torch.manual_seed(seed)
-    weights = {
-        name: torch.randn(shape) * (1.0 / np.sqrt(shape[0]) if len(shape) > 1 else 0.1)
-        if not name.endswith("bias")
-        else torch.zeros(shape)
-        for name, shape in CandidateNetwork.shapes(width).items()
-    }
-    for values in weights.values():
-        values.requires_grad_()
-    count = len(examples.whole)
-    updates = epochs * (count // BATCH)
-    optimiser = torch.optim.Adam(weights.values(), lr=RATE)
-    rate = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates)
-    inputs, wanted, log_weight, whole = (
-        torch.as_tensor(part)
-        for part in (examples.inputs, examples.wanted, examples.log_weight, examples.whole)
-    )
-    drawn = torch.Generator().manual_seed(seed)
-    for _ in range(epochs):
-        order = torch.randperm(count, generator=drawn)
-        for start in range(0, count // BATCH * BATCH, BATCH):
-            own = order[start : start + BATCH]
-            logits = _logits(weights, inputs[own].float(), log_weight[own], whole[own])
-            likely = logits.log_softmax(dim=1).clamp(min=-50.0)
-            loss = -(likely * wanted[own]).sum(dim=1).mean()
-            optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
-            optimiser.step()
-            rate.step()
-    return {name: values.detach().numpy() for name, values in weights.items()}
-
-
-def _logits(
-    weights: Mapping[str, Tensor], inputs: Tensor, log_weight: Tensor, whole: Tensor
-) -> Tensor:
-    """Return the scores of `CandidateNetwork`, with the candidates that each stands for."""
-    joined = torch.cat((weights["static"], weights["changing"]))
-    first = inputs @ joined + (whole @ weights["whole"] + weights["first_bias"])[:, None]
-    second = torch.relu(torch.relu(first) @ weights["second"] + weights["second_bias"])
-    hidden = torch.relu(whole @ weights["finish_first"] + weights["finish_first_bias"])
-    finish = hidden @ weights["finish"] + weights["finish_bias"]
-    return torch.cat((second @ weights["score"] + log_weight, finish[:, None]), dim=1)
-
-
 @app.command()
 def train(
-    shown: Annotated[list[Path], typer.Argument(help="Files of `show`.")],
+    shown: Annotated[
+        list[Path] | None, typer.Argument(help="Files of `show`, which it imitates first.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="The weights.")] = Path(
         "out/packaged/packaged_agent.safetensors"
     ),
-    width: Annotated[int, typer.Option(min=1, help="Width of the hidden layers.")] = 64,
-    epochs: Annotated[int, typer.Option(min=1)] = 15,
-    held_out: Annotated[int, typer.Option(min=1, help="Last cases, that only check it.")] = 24,
-    seed: int = 0,
+    weights: Annotated[
+        Path | None, typer.Option(help="Weights in place of the package's, to begin with.")
+    ] = None,
+    width: Annotated[int, typer.Option(min=1, help="Width of the hidden layers.")] = WIDTH,
+    visits: Annotated[
+        int, typer.Option(min=0, help="Cases on which it learns from its own draws.")
+    ] = VISITS,
+    first: Annotated[int, typer.Option(min=0, help="Round of the first of these cases.")] = 0,
+    checked: Annotated[int, typer.Option(min=1, help="Further cases, that only check it.")] = 56,
+    seeds: Annotated[int, typer.Option(min=1, help="Trainings; the best policy is kept.")] = 1,
+    processes: Annotated[int, typer.Option(min=1)] = 1,
 ) -> None:
-    """Fit the policy to the layouts of `show`; print what it has by guesses on further cases."""
-    torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
+    """Fit the policy to the layouts of `show`, or begin with the package's; learn from own draws.
+
+    It prints what the policy has by guesses on further cases.
+    """
     with user_errors():
-        cases = [case for path in shown for case in read_shown(path) if case["shares"][0] > 0.0]
-        sites = list(dict.fromkeys(case["site"] for case in cases))[-held_out:]
-        learnt = [case for case in cases if case["site"] not in sites]
-        if not learnt:
-            raise BlastEnvError(f"there are {len(cases)} cases, must be more than {held_out}")
-        weights = fitted(Examples.of(learnt, seed), width, epochs, seed)
-        about = {"cases": str(len(learnt)), "surrogate": packaged_surrogate().digest}
-        write_weights(weights, about, out)
-        agent = load_packaged(out)
-        rows = [_guessed(agent, case) for case in cases if case["site"] in sites]
-        print_line(_guessed_table(rows))
-        print_line(f"\n{len(learnt)} cases; wrote {out}")
+        examples = [case for path in shown or () for case in read_shown(path)]
+        begin_with: list[Mapping[str, Any]] | Weights = [
+            case for case in examples if case["shares"][0] > 0.0
+        ]
+        if not begin_with:
+            agent = packaged_agent() if weights is None else load_packaged(weights)
+            begin_with = agent.network.weights
+        one = partial(
+            _trained, begin_with, shown_cases(checked, CHECKED_ROUND), width, visits, first
+        )
+        with progress_bar("trainings") as progress:
+            found = run_all(one, range(seeds), processes, progress)
+        print_line(_guessed_table([part for parts in found for part in parts]))
+        best = max((parts[-1] for parts in found), key=lambda part: part.few)
+        about = {"surrogate": packaged_surrogate().digest, "seed": str(best.seed)}
+        write_weights(best.weights, about, out)
+        print_line(f"\nwrote {out}, of the seed {best.seed}")
 
 
-def _guessed(agent: PackagedAgent, case: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return shares of the load by guesses: policy, mean and best draw, best rule, search."""
-    scenario = scenario_of(case["site"])
-    charge = _charge_of(scenario, case)
+class Trained(NamedTuple):
+    """A part of a training, and the mean shares of the load by guesses on cases that check it.
+
+    Attributes:
+        seed: Its seed.
+        after: What it has learnt from so far.
+        weights: The weights.
+        cases: Number of the cases.
+        one: Share of the policy's layout.
+        mean: Mean share of draws.
+        few: Best share of the policy's layout and a few draws.
+        best: Best share of it and many draws.
+        rule: Share of the best rule.
+    """
+
+    seed: int
+    after: str
+    weights: Weights
+    cases: int
+    one: float
+    mean: float
+    few: float
+    best: float
+    rule: float
+
+
+def _trained(
+    begin_with: Sequence[Mapping[str, Any]] | Weights,
+    checked: Sequence[tuple[str, bool]],
+    width: int,
+    visits: int,
+    first: int,
+    seed: int,
+) -> list[Trained]:
+    """Return the parts of a training: by imitation or from weights, then by own draws."""
+    torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
+    after, weights = "nothing new", begin_with
+    if not isinstance(weights, Mapping):
+        after, weights = "imitation", fitted(Examples.of(weights, seed), width, seed)
+    found = [_part(seed, after, weights, checked)]
+    if visits:
+        cases = shown_cases(visits, first)
+        weights = reinforced(weights, cases, packaged_surrogate(), seed)
+        found.append(_part(seed, f"draws on {visits} cases", weights, checked))
+    return found
+
+
+def _part(seed: int, after: str, weights: Weights, checked: Sequence[tuple[str, bool]]) -> Trained:
+    agent = PackagedAgent(CandidateNetwork(weights))
+    shares = np.mean([_guessed(agent, *case) for case in checked], axis=0).tolist()
+    return Trained(seed, after, weights, len(checked), *shares)
+
+
+def _guessed(agent: PackagedAgent, name: str, known: bool) -> tuple[float, ...]:
+    """Return shares of the load by guesses: policy, mean draw, the best of few and all, rule."""
+    scenario = scenario_of(name)
+    charge = charge_of(scenario, known)
     guesses = Guesses.of(packaged_surrogate(), case_for(scenario, charge))
-    drawn = agent.sample(scenario, charge, DRAWS)
-    likeliest = agent.likeliest(scenario, charge)
-    asked = [tuple(sorted(layout)) for layout in ((), likeliest, *drawn)]
-    unprotected, one, *rest = guesses.loads(asked).tolist()
-    shares = reductions(np.array([one, np.mean(rest), min(one, *rest)]), np.full(3, unprotected))
-    return (*shares.tolist(), case["rule"], case["shares"][0])
+    layouts = agent.likeliest(scenario, charge), *agent.sample(scenario, charge, DRAWS)
+    one, *drawn = guesses.loads([tuple(sorted(layout)) for layout in layouts]).tolist()
+    rules = layouts_by_rule(scenario, charge).values()
+    unprotected, *ruled = guesses.loads([(), *rules]).tolist()
+    best = min(one, *drawn[:FEW_DRAWS]), min(one, *drawn), min(unprotected, *ruled)
+    loads = np.array([one, np.mean(drawn), *best])
+    return tuple(reductions(loads, np.full(len(loads), unprotected)).tolist())
 
 
-def _guessed_table(rows: Sequence[tuple[float, ...]]) -> str:
-    mean = 100.0 * np.mean(np.array(rows), axis=0)
-    headers = ("cases", "the policy", "mean draw", f"best of it and {DRAWS}", "best rule", "search")
-    return markdown_table(headers, [(str(len(rows)), *(f"{value:.1f} %" for value in mean))])
+def _guessed_table(parts: Sequence[Trained]) -> str:
+    best = (f"best of it and {FEW_DRAWS}", f"best of it and {DRAWS}", "best rule")
+    headers = ("seed", "after", "cases", "the policy", "mean draw", *best)
+    rows = [
+        (
+            *(str(part.seed), part.after, str(part.cases)),
+            *(f"{100.0 * value:.1f} %" for value in part[4:]),
+        )
+        for part in parts
+    ]
+    return markdown_table(headers, rows)
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ its layouts and those of the rules. `python -m studies.packaged_agent` trains an
 does without torch.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,14 @@ from safetensors.numpy import load, save
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, case_for, improved
-from blast_env.design.search.package import LEAST_GAIN, proposed
+from blast_env.design.search.moves import drawn_by_rank
+from blast_env.design.search.package import proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
 from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
+from blast_env.layout import LayoutState
 from blast_env.layout.batch import LayoutBatch, PlacementRules
 from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
@@ -40,14 +42,26 @@ Weights = Mapping[str, NDArray[np.float32]]
 WEIGHTS: Final = "packaged_agent.safetensors"
 """Name of the file of the weights, in this package."""
 
+FEW_DRAWS: Final = 8
+"""Layouts that the agent draws for one proposal."""
+
 DRAWS: Final = 32
 """Layouts that the agent draws where guesses choose among them."""
 
-CHANGES: Final = 120
+CHANGES: Final = 240
 """Changes of the best guesses that are looked at after that."""
+
+SURE_GAIN: Final = 0.01
+"""Least share of the load without a barrier that a layout promises beyond the rules' ones."""
 
 MOST_DRAWS: Final = 10_000
 """Largest number of layouts of one call."""
+
+_FEW_CANDIDATES: Final = 12_000
+"""Candidates in all draws of one proposal: more take it beyond 50 ms."""
+
+_MOST_REDRAWN: Final = 3
+"""Most pieces that are taken away, and drawn anew, in a change."""
 
 _MOST_BYTES: Final = 5_000_000
 
@@ -141,12 +155,35 @@ class CandidateNetwork:
     def scores(self, prepared: FloatArray, changing: FloatArray, whole: FloatArray) -> FloatArray:
         """Return the score of each candidate and, last, of finishing (candidates + 1,)."""
         own = self.weights
-        first = prepared + changing @ own["changing"] + whole @ own["whole"]
+        first = changing @ own["changing"]
+        first += prepared
+        first += whole @ own["whole"]
         np.maximum(first, 0.0, out=first)
-        second = first @ own["second"] + own["second_bias"]
+        second = first @ own["second"]
+        second += own["second_bias"]
         np.maximum(second, 0.0, out=second)
         finish = np.maximum(whole @ own["finish_first"] + own["finish_first_bias"], 0.0)
         return np.append(second @ own["score"], finish @ own["finish"] + own["finish_bias"])
+
+
+class Decision(NamedTuple):
+    """What layouts with the same pieces go on with.
+
+    Attributes:
+        legal: The candidates that are legal (legal,).
+        changing: Their changing features (legal, CHANGING).
+        whole: Features of site and layout (WHOLE,).
+        scores: Their scores, and last that of finishing (legal + 1,).
+        indices: The layouts.
+        choices: What each goes on with: places in `scores`.
+    """
+
+    legal: IntArray
+    changing: FloatArray
+    whole: FloatArray
+    scores: FloatArray
+    indices: Sequence[int]
+    choices: Sequence[int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,12 +211,17 @@ class PackagedAgent:
         return digest.hexdigest()[:16]
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
-        """Return the first of the policy's layout, the rules' ones and none, as `ranked` has them.
+        """Return the first of the policy's layout, the rules' ones, none, and a few draws.
+
+        They are as `ranked` has them. There are fewer draws where there are many candidates.
 
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
         """
-        return self.ranked(scenario, charge, 0, changes=0)[0]
+        found = find_scenario(scenario)
+        candidates = int(LayoutState.empty(found).legal.sum())
+        few = min(FEW_DRAWS, _FEW_CANDIDATES // max(candidates, 1))
+        return self.ranked(found, charge, few, changes=0)[0]
 
     def likeliest(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the policy's layout, of the candidates with the highest scores.
@@ -187,7 +229,7 @@ class PackagedAgent:
         Raises:
             BlastEnvError: As for `propose`.
         """
-        return self._layouts(Candidates.of(find_scenario(scenario), charge), 1, None)[0]
+        return self.layouts(Candidates.of(find_scenario(scenario), charge), 1, None)[0]
 
     def sample(
         self,
@@ -203,7 +245,7 @@ class PackagedAgent:
         """
         checked = whole_number("count", count, 1, MOST_DRAWS)
         candidates = Candidates.of(find_scenario(scenario), charge)
-        return self._layouts(candidates, checked, generator(seed))
+        return self.layouts(candidates, checked, generator(seed))
 
     def ranked(
         self,
@@ -215,10 +257,10 @@ class PackagedAgent:
     ) -> tuple[Layout, ...]:
         """Return the layouts of policy and rules, draws, none and changes, the best guess first.
 
-        Changes are of the best guesses so far, as in a search by guesses alone. The more layouts
-        are looked at, the more the best guess owes to its error. So the best of the rules' layouts
-        and none stays in front of another one that does not promise `LEAST_GAIN` of the load
-        without a barrier more. Each layout is sorted, and there once.
+        Changes are of the best guesses so far, as `searched` has them. The more layouts are looked
+        at, the more the best guess owes to its error. So the best of the rules' layouts and none
+        stays in front of another one that does not promise `SURE_GAIN` of the load without a
+        barrier more. Each layout is sorted, and there once.
 
         Args:
             scenario: The scenario.
@@ -230,33 +272,96 @@ class PackagedAgent:
         Raises:
             BlastEnvError: As for `propose`, or if a number is out of bounds.
         """
-        most = whole_number("changes", changes, 0, MOST_DRAWS)
-        checked, found = whole_number("count", count, 0, MOST_DRAWS), find_scenario(scenario)
+        found = find_scenario(scenario)
         guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
         rules = layouts_by_rule(found, charge)
-        candidates = Candidates.of(found, charge, rules)
         known = [(), *(tuple(sorted(layout)) for layout in rules.values())]
-        layouts = [*known, *self._layouts(candidates, 1, None)]
-        if checked:
-            layouts += self._layouts(candidates, checked, generator(seed))
-        ranked = improved(guesses, layouts, most, generator(seed))
+        ranked = self.searched(guesses, charge, rules, count, changes, seed)
         surest = known[int(guesses.loads(known).argmin())]
         unprotected, sure, best = guesses.loads([(), surest, ranked[0]]).tolist()
-        if best > sure - LEAST_GAIN * unprotected:
+        if best > sure - SURE_GAIN * unprotected:
             ranked.remove(surest)
             ranked.insert(0, surest)
         return tuple(ranked)
 
-    def _layouts(
-        self, candidates: Candidates, count: int, rng: np.random.Generator | None
+    def searched(
+        self,
+        guesses: Guesses,
+        charge: AnyCharge | None,
+        rules: Mapping[str, Layout],
+        count: int,
+        changes: int,
+        seed: int = 0,
+    ) -> list[Layout]:
+        """Return all layouts of a search by guesses, the best first, each sorted.
+
+        It begins with none, the rules' layouts, the policy's and draws, and then changes the best.
+        Half of the changes are moves. For the others it takes up to three pieces away, and the
+        policy draws further ones.
+
+        Args:
+            guesses: The guesses, which it extends.
+            charge: The charge, if it is known.
+            rules: The layouts of all rules by title.
+            count: Number of draws, 0 to 10,000.
+            changes: Number of changes, 0 to 10,000.
+            seed: Seed of draws and changes.
+
+        Raises:
+            BlastEnvError: As for `propose`, or if a number is out of bounds.
+        """
+        most = whole_number("changes", changes, 0, MOST_DRAWS)
+        checked = whole_number("count", count, 0, MOST_DRAWS)
+        candidates = Candidates.of(guesses.case.scenario, charge, rules)
+        layouts = [(), *rules.values(), *self.layouts(candidates, 1, None)]
+        if checked:
+            layouts += self.layouts(candidates, checked, generator(seed))
+        redrawn = partial(self._redrawn, candidates)
+        return improved(guesses, layouts, most, generator(seed), change=redrawn)
+
+    def _redrawn(
+        self,
+        candidates: Candidates,
+        best: Sequence[Layout],
+        count: int,
+        rng: np.random.Generator,
+    ) -> list[Layout]:
+        """Return changes of layouts: pieces are taken away at random, and drawn by the policy."""
+        parts = []
+        for _ in range(count):
+            pieces = candidates.indices_of(drawn_by_rank(best, rng))
+            gone = min(1 + int(rng.integers(_MOST_REDRAWN)), len(pieces))
+            stay = np.sort(rng.permutation(len(pieces))[gone:])
+            parts.append(tuple(pieces[place] for place in stay.tolist()))
+        return [tuple(sorted(layout)) for layout in self.layouts(candidates, count, rng, parts)]
+
+    def layouts(
+        self,
+        candidates: Candidates,
+        count: int,
+        rng: np.random.Generator | None,
+        begun: Sequence[tuple[int, ...]] = (),
+        tell: Callable[[Decision], None] = lambda _: None,
     ) -> tuple[Layout, ...]:
-        """Return layouts, drawn or, without a generator, of the highest scores."""
+        """Return layouts, drawn or, without a generator, of the highest scores.
+
+        Args:
+            candidates: The candidates.
+            count: Number of layouts.
+            rng: The generator.
+            begun: Candidates that stand at first in each, if any do.
+            tell: Called with each decision.
+        """
         prepared = self.network.prepared(candidates.static)
         rules = PlacementRules.of(candidates.empty)
         batch = LayoutBatch(candidates.empty, rules, count)
         batch.begin(range(count), rules, candidates.empty)
-        standing: dict[frozenset[int], Standing] = {frozenset(): Standing(candidates)}
-        placed: list[frozenset[int]] = [frozenset()] * count
+        parts = begun or [()] * count
+        for step in range(max(map(len, parts))):
+            own = [index for index, part in enumerate(parts) if len(part) > step]
+            batch.place(own, [int(candidates.numbers[parts[index][step]]) for index in own])
+        standing = {frozenset(part): Standing.after(candidates, part) for part in parts}
+        placed = [frozenset(part) for part in parts]
         open_ones = np.flatnonzero(~batch.is_full).tolist()
         while open_ones:
             # Many layouts have the same pieces: the network looks at them once.
@@ -270,7 +375,9 @@ class PackagedAgent:
                 changing = state.features(legal)
                 whole = state.whole(legal, changing, int(batch.left[indices[0], 0]))
                 scores = self.network.scores(prepared[legal], changing, whole)
-                for index, choice in zip(indices, _choices(scores, len(indices), rng), strict=True):
+                choices = _choices(scores, len(indices), rng)
+                tell(Decision(legal, changing, whole, scores, indices, choices))
+                for index, choice in zip(indices, choices, strict=True):
                     if choice == len(legal):
                         continue
                     candidate = int(legal[choice])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blast_agents import PackagedAgent, packaged_agent
 from blast_agents.packaged import (
+    SURE_GAIN,
     AgentProposer,
     load_packaged,
     read_weights,
@@ -21,7 +22,6 @@ from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.design.proposal import problem_of
 from blast_env.design.search import Guesses, layouts_by_rule, search_by
-from blast_env.design.search.package import LEAST_GAIN
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.layout import LayoutState, draw_threat, load_layout
@@ -57,7 +57,8 @@ def test_its_layouts_keep_every_condition_of_any_zone(scenario: Scenario, is_kno
     proposed = agent.propose(scenario, charge)
     assert layout
     assert len(drawn) == 6
-    for own in (layout, proposed, *drawn):
+    changed = agent.ranked(scenario, charge, 2, changes=16)
+    for own in (layout, proposed, *drawn, *changed):
         assert LayoutState.of(scenario, own).layout == own
     assert agent.likeliest(scenario, charge) == layout
     assert agent.propose(scenario, charge) == proposed
@@ -72,7 +73,7 @@ def test_layouts_that_are_drawn_differ_and_the_first_one_of_the_ranked_has_the_b
     guesses = guesses_of(CONTROL_ROOM, charge)
     loads = guesses.loads(ranked)
     assert (np.diff(loads[1:]) >= 0.0).all()
-    assert loads[0] <= loads[1] + LEAST_GAIN * guesses.loads([()])
+    assert loads[0] <= loads[1] + SURE_GAIN * guesses.loads([()])
     assert packaged_agent().ranked(CONTROL_ROOM, charge, 8) == ranked
 
 
@@ -85,7 +86,19 @@ def test_a_proposal_is_behind_no_rule_and_hardly_behind_the_policy_by_guesses() 
             [packaged_agent().propose(scenario, charge), *others]
         )
         assert own <= min(bare, *ruled)
-        assert own <= policy + LEAST_GAIN * bare
+        assert own <= policy + SURE_GAIN * bare
+
+
+def test_a_search_by_guesses_with_its_changes_is_not_behind_its_draws_and_the_rules() -> None:
+    charge = draw_threat(CONTROL_ROOM, 0)
+    guesses, rules = guesses_of(CONTROL_ROOM, charge), layouts_by_rule(CONTROL_ROOM, charge)
+    arguments = guesses, charge, rules, 8
+    known = packaged_agent().searched(*arguments, changes=0)
+    found = packaged_agent().searched(*arguments, changes=40)
+    assert len(set(found)) == len(found) > len(known)
+    assert set(known) < set(found)
+    loads = guesses.loads([found[0], known[0], *rules.values()])
+    assert loads[0] < loads[1] <= min(loads[2:])
 
 
 def test_it_is_better_by_guesses_than_random_layouts_on_sites_that_it_has_not_seen() -> None:

@@ -188,9 +188,10 @@ SMALLER: Final[dict[str, str]] = {
         "--sites 2"
     ),
     "python -m studies.packaged_agent show --out out/packaged/shown.jsonl": (
-        "--rounds 1 --changes 5"
+        "--count 2 --changes 5"
     ),
-    "python -m studies.packaged_agent train out/packaged/shown.jsonl": "--epochs 1 --held-out 2",
+    "python -m studies.packaged_agent train out/packaged/shown.jsonl": "--visits 4 --checked 2",
+    "python -m studies.packaged_agent train --visits 1500": "--visits 4 --checked 2",
     "python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 20": (
         "--sites 2"
     ),

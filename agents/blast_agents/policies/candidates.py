@@ -6,9 +6,10 @@ stand, in the frame of the line from the charge to the walls. So a turned or mir
 same features, and their number does not depend on the site.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -135,8 +136,8 @@ class Candidates:
         last: Bearing after the last one (places, candidates).
         hidden: Share of the walls' height that each hides (places, candidates).
         shares: Share of the load by bearing (places, BEARINGS).
-        boxes_m: Left, bottom, right and top of each (candidates, 4).
-        frame_m: Position of each along and aside of the mean line, m (candidates, 2).
+        edges_m: Left, bottom, right and top of each (4, candidates).
+        frame_m: Position of each along and aside of the mean line, m (2, candidates).
         item: Number of the item of each (candidates,).
         variant: Number of the variant of each (candidates,).
         cost: Cost of each (candidates,).
@@ -152,7 +153,7 @@ class Candidates:
     last: IntArray
     hidden: FloatArray
     shares: FloatArray
-    boxes_m: FloatArray
+    edges_m: FloatArray
     frame_m: FloatArray
     item: IntArray
     variant: IntArray
@@ -222,9 +223,9 @@ class Candidates:
             static=np.clip(static, -_MOST, _MOST).astype(np.float32),
             first=np.stack([view.first for view in views]),
             last=np.stack([view.last for view in views]),
-            hidden=np.stack([view.hidden for view in views]),
+            hidden=np.stack([view.hidden for view in views]).astype(np.float32),
             shares=np.stack([view.faced.shares for view in views]),
-            boxes_m=boxes_m,
+            edges_m=np.ascontiguousarray(boxes_m.T, np.float32),
             frame_m=_frame_m(views),
             item=np.array([variant.item for variant in variants])[number],
             variant=number,
@@ -233,6 +234,21 @@ class Candidates:
             is_measure=is_measure,
             is_post=is_post,
         )
+
+    @cached_property
+    def parts(self) -> IntArray:
+        """Number of the part of the bearings that each hides (places, candidates)."""
+        return self.first * (BEARINGS + 1) + self.last
+
+    @cached_property
+    def _index(self) -> dict[int, int]:
+        return {number: index for index, number in enumerate(self.numbers.tolist())}
+
+    def indices_of(self, layout: Layout) -> list[int]:
+        """Return the candidates of a layout, posts of the line first; others are left out."""
+        numbers = map(self.empty.catalogue.action, layout)
+        found = [self._index[number] for number in numbers if number in self._index]
+        return sorted(found, key=lambda index: not self.is_post[index])
 
 
 _HIDDEN_CUT: Final = STATIC.index("hidden_cut")
@@ -279,9 +295,10 @@ def _seen(views: Sequence[_View]) -> FloatArray:
 
 
 def _frame_m(views: Sequence[_View]) -> FloatArray:
-    """Return the position of each along and aside of the mean line, m (candidates, 2)."""
+    """Return the position of each along and aside of the mean line, m (2, candidates)."""
     along_m = np.mean([view.along_m for view in views], axis=0)
-    return np.stack((along_m, np.mean([view.aside_m for view in views], axis=0)), axis=1)
+    aside_m = np.mean([view.aside_m for view in views], axis=0)
+    return np.stack((along_m, aside_m)).astype(np.float32)
 
 
 def _sizes(
@@ -430,6 +447,19 @@ def _in_reach(scenario: Scenario, boxes_m: FloatArray) -> FloatArray:
     return found
 
 
+def _sums_of_parts(values: FloatArray) -> FloatArray:
+    """Return the sums from each bearing to before each other (BEARINGS + 1 squared,)."""
+    up_to = np.append(0.0, np.cumsum(values))
+    sums: FloatArray = (up_to - up_to[:, np.newaxis]).ravel()
+    return sums
+
+
+_LENGTHS: Final = np.maximum(
+    np.arange(BEARINGS + 1) - np.arange(BEARINGS + 1)[:, np.newaxis], 1
+).ravel()
+"""Number of bearings from each to before each other, at least 1."""
+
+
 class Standing:
     """What the pieces of a layout that grows mean for the candidates.
 
@@ -446,18 +476,27 @@ class Standing:
         count = len(candidates.numbers)
         self._of = candidates
         self._covered = np.zeros_like(candidates.shares)
-        self._gap_m = np.full(count, np.inf)
-        self._nearest = np.full(count, -1)
+        # Gap to the nearest piece, distances along and aside of it, and whether it is alike.
+        self._gap_m = np.full(count, np.inf, dtype=np.float32)
+        self._beside = np.zeros((4, count), dtype=np.float32)
         self.placed = 0
         self.posts = 0
         self.spent = 0.0
+
+    @classmethod
+    def after(cls, candidates: Candidates, pieces: Iterable[int]) -> "Standing":
+        """Return the state after some candidates."""
+        state = cls(candidates)
+        for index in pieces:
+            state.add(index)
+        return state
 
     def copy(self) -> "Standing":
         """Return an equal state that grows by itself."""
         other = Standing.__new__(Standing)
         other._of = self._of
         other._covered, other._gap_m = self._covered.copy(), self._gap_m.copy()
-        other._nearest = self._nearest.copy()
+        other._beside = self._beside.copy()
         other.placed, other.posts, other.spent = self.placed, self.posts, self.spent
         return other
 
@@ -474,43 +513,45 @@ class Standing:
             np.maximum(
                 self._covered[place, part], of.hidden[place, index], out=self._covered[place, part]
             )
-        left, bottom, right, top = of.boxes_m[index]
-        boxes_m = of.boxes_m
+        left, bottom, right, top = of.edges_m
         gap_m = np.hypot(
-            np.maximum(np.maximum(left - boxes_m[:, 2], boxes_m[:, 0] - right), 0.0),
-            np.maximum(np.maximum(bottom - boxes_m[:, 3], boxes_m[:, 1] - top), 0.0),
+            np.maximum(np.maximum(left[index] - right, left - right[index]), 0.0),
+            np.maximum(np.maximum(bottom[index] - top, bottom - top[index]), 0.0),
         )
-        nearer = gap_m < self._gap_m
-        self._gap_m[nearer], self._nearest[nearer] = gap_m[nearer], index
+        nearer = np.flatnonzero(gap_m < self._gap_m)
+        self._gap_m[nearer] = gap_m[nearer]
+        along_m, aside_m = of.frame_m
+        self._beside[0, nearer] = np.abs(along_m[nearer] - along_m[index])
+        self._beside[1, nearer] = np.abs(aside_m[nearer] - aside_m[index])
+        self._beside[2, nearer] = of.item[nearer] == of.item[index]
+        self._beside[3, nearer] = of.variant[nearer] == of.variant[index]
 
     def features(self, chosen: IntArray) -> FloatArray:
         """Return the changing features of some candidates (chosen, CHANGING)."""
         of = self._of
-        open_cut, covered = np.zeros(len(chosen)), np.zeros(len(chosen))
-        for place in range(len(of.shares)):
+        found = np.zeros((len(CHANGING), len(chosen)), dtype=np.float32)
+        places = len(of.shares)
+        for place in range(places):
             shares, cover = of.shares[place], self._covered[place]
-            first, last = of.first[place, chosen], of.last[place, chosen]
-            up_to = np.append(0.0, np.cumsum(shares * (1.0 - cover)))
-            cover_to = np.append(0.0, np.cumsum(cover))
-            open_cut += (up_to[last] - up_to[first]) * of.hidden[place, chosen]
-            covered += (cover_to[last] - cover_to[first]) / np.maximum(last - first, 1)
-        found = np.zeros((len(chosen), len(CHANGING)), dtype=np.float32)
-        found[:, 0] = 3.0 * open_cut / len(of.shares)
-        found[:, 1] = covered / len(of.shares)
+            # Sums over all parts of the bearings: candidates look theirs up.
+            open_parts = _sums_of_parts(shares * (1.0 - cover)) * (3.0 / places)
+            cover_parts = _sums_of_parts(cover) / _LENGTHS / places
+            parts = of.parts[place, chosen]
+            found[0] += open_parts.astype(np.float32)[parts] * of.hidden[place, chosen]
+            found[1] += cover_parts.astype(np.float32)[parts]
         budget = of.empty.scenario.zone.budget
         if budget:
-            found[:, 9] = of.cost[chosen] / max(budget - self.spent, 1e-9)
+            found[9] = of.cost[chosen] / max(budget - self.spent, 1e-9)
         if bool(np.isinf(self._gap_m[0])):
-            found[:, 2] = 1.0
-            return np.clip(found, -_MOST, _MOST)
-        gap_m, nearest = self._gap_m[chosen], self._nearest[chosen]
-        apart_m = np.abs(of.frame_m[chosen] - of.frame_m[nearest])
-        found[:, 3] = gap_m / 3.0
-        found[:, 4] = gap_m <= 0.0
-        found[:, 5:7] = apart_m / 2.0
-        found[:, 7] = of.item[chosen] == of.item[nearest]
-        found[:, 8] = of.variant[chosen] == of.variant[nearest]
-        return np.clip(found, -_MOST, _MOST)
+            found[2] = 1.0
+        else:
+            gap_m = self._gap_m[chosen]
+            found[3] = gap_m / 3.0
+            found[4] = gap_m <= 0.0
+            found[5:9] = self._beside[:, chosen]
+            found[5:7] /= 2.0
+        clipped: FloatArray = np.minimum(np.maximum(found, -_MOST), _MOST).T
+        return clipped
 
     def whole(self, chosen: IntArray, changing: FloatArray, stock_left: int) -> FloatArray:
         """Return the features of site and layout (WHOLE,).

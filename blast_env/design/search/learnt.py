@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import cycle
 from math import ceil
 from typing import Final
 
@@ -87,12 +88,17 @@ class Guesses:
         return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
 
 
+Changer = Callable[[Sequence[Layout], int, np.random.Generator], Sequence[Layout]]
+"""Returns a number of changes of the best layouts so far, which are in order; each is sorted."""
+
+
 def improved(
     guesses: Guesses,
     begin_with: Iterable[Layout],
     most: int,
     rng: np.random.Generator,
     tell: Callable[[float], None] = lambda _: None,
+    change: Changer | None = None,
 ) -> list[Layout]:
     """Return all layouts of a search by predictions alone, the best first.
 
@@ -104,16 +110,22 @@ def improved(
         most: Largest number of further layouts.
         rng: Draws the changes.
         tell: Called with the share that is done.
+        change: What changes every other batch of layouts in the place of moves.
     """
     guesses.loads([tuple(sorted(layout)) for layout in begin_with])
     moves, end = Moves(guesses.case.scenario), guesses.count + most
+
+    def moved(best: Sequence[Layout], count: int, rng: np.random.Generator) -> list[Layout]:
+        return [moves.near_best(best, rng) for _ in range(count)]
+
+    in_turn = cycle([moved] if change is None else [change, moved])
     # Moves may lead back to known layouts, which add none: a bound on the tries ends the search on
     # small sites.
     tries = 0
     while guesses.count < end and tries < 4 * most:
         tell(1.0 - (end - guesses.count) / most)
         best = guesses.ranked()[:_KEPT]
-        changed = [moves.near_best(best, rng) for _ in range(min(_BATCH, end - guesses.count))]
+        changed = next(in_turn)(best, min(_BATCH, end - guesses.count), rng)
         guesses.loads(changed)
         tries += len(changed)
     return guesses.ranked()

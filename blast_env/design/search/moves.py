@@ -101,6 +101,12 @@ def random_part(scenario: Scenario, rng: np.random.Generator) -> Layout:
     return layout[: int(rng.integers(len(layout) + 1))]
 
 
+def drawn_by_rank(best: Sequence[Layout], rng: np.random.Generator) -> Layout:
+    """Return one of some layouts, the best first; the probability falls with the rank."""
+    # The best has 63 % of the draws, the next 23 %: exploitation with a way out.
+    return best[min(int(rng.exponential(1.0)), len(best) - 1)]
+
+
 @dataclass(frozen=True)
 class Moves:
     """Draws a neighbour of a layout.
@@ -129,8 +135,7 @@ class Moves:
             best: Layouts, the best first; the probability falls exponentially with the rank.
             rng: Draws the layout and the moves.
         """
-        # The best has 63 % of the draws, the next 23 %: exploitation with a way out.
-        layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
+        layout = drawn_by_rank(best, rng)
         for _ in range(1 + int(rng.random() < 0.4)):
             layout = self.neighbour(layout, rng)
         return tuple(sorted(layout))
