@@ -5,7 +5,7 @@ without an obstacle is run once. Sites and obstacles fill their ranges by scramb
 with fixed seeds. All lengths are over the cube root of the mass, m/kg^(1/3).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -34,7 +34,7 @@ class Family:
     Attributes:
         name: Its name.
         title: What it is, for readers.
-        site: Ranges of the numbers of a site.
+        site: Ranges of the numbers of a site. In another order they draw other sites.
         obstacle: Ranges of the numbers of an obstacle.
         obstacles: Number of obstacles of a group.
         scenes: Returns the scenes of a group: a site's numbers, its obstacles' numbers; the first
@@ -73,6 +73,13 @@ _FACADE: Final[Ranges] = {
     "facade_height": (0.5, 2.0),
     "aside": (0.0, 1.2),
     "raised": (-0.6, 0.4),
+}
+_NEAR: Final[Ranges] = {**_FACADE, "distance": (1.3, 4.0)}
+_FAR: Final[Ranges] = {
+    **_FACADE,
+    "distance": (5.0, 14.0),
+    "facade_height": (0.4, 2.0),
+    "raised": (-0.8, 0.4),
 }
 
 
@@ -150,6 +157,16 @@ def _raised(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return [first, ground, *others]
 
 
+_POSTS: Final[Ranges] = {
+    "solid": (0.2, 0.85),
+    "size": (0.05, 0.3),
+    "height": (0.08, 0.8),
+    "share": (0.1, 0.9),
+    "length": (1.0, 4.5),
+    "shift": (-0.5, 0.5),
+}
+
+
 def _posts(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     box, numbers, up = _facade(site)
     scenes = [Scene(numbers, box, up=up)]
@@ -167,6 +184,14 @@ def _posts(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
+_OPPOSITE: Final[Ranges] = {
+    "behind": (0.3, 2.5),
+    "height": (0.15, 2.0),
+    "length": (0.6, 5.0),
+    "shift": (-0.4, 0.4),
+}
+
+
 def _opposite(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     box, numbers, up = _facade(site)
     scenes = [Scene(numbers, box, up=up)]
@@ -182,6 +207,14 @@ def _opposite(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
 
 _STREET_MODULES: Final = 66
 _STREET_BACK: Final = 12
+
+_ALONG: Final[Ranges] = {"away": (0.33, 1.4), "facade_height": (0.5, 2.0)}
+_STREET: Final[Ranges] = {
+    "other": (0.3, 1.5),
+    "height": (0.2, 2.0),
+    "crossing": (-1.5, 1.0),
+    "crossing_at": (0.3, 2.5),
+}
 
 
 def _street(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
@@ -208,6 +241,15 @@ def _street(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
+_ENDS: Final[Ranges] = {name: _NEAR[name] for name in ("distance", "facade_height")}
+_TEE: Final[Ranges] = {
+    "width": (0.7, 2.6),
+    "height": (0.2, 2.0),
+    "across": (0.1, 1.5),
+    "sides": (0.0, 1.0),
+}
+
+
 def _tee(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     """Return a facade across the end of a street, alone, then with the street's fronts."""
     box, numbers, _ = _facade({**site, "aside": 0.0})
@@ -227,6 +269,15 @@ def _tee(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
         }
         scenes.append(Scene({**numbers, **own}, box, others=parts))
     return scenes
+
+
+_COURT: Final[Ranges] = {
+    "distance": (0.9, 3.5),
+    "facade_height": (0.5, 2.0),
+    "aside": (-1.0, 1.0),
+    "width": (1.0, 2.6),
+}
+_WINGS: Final[Ranges] = {"depth": (0.2, 2.0), "height": (0.3, 1.6), "sides": (0.0, 1.0)}
 
 
 def _court(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
@@ -249,6 +300,15 @@ def _court(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
+_SHADOW: Final[Ranges] = {
+    "distance": (1.3, 4.0),
+    "height": (0.5, 2.2),
+    "depth": (0.5, 2.5),
+    "width": (0.5, 2.5),
+    "aside": (0.0, 1.2),
+}
+
+
 def _shadow(site: Numbers, _: list[Numbers]) -> list[Scene]:
     """Return a block with loads on all of its walls."""
     distance, high = _modules(site["distance"]), _modules(site["height"], 6)
@@ -259,10 +319,47 @@ def _shadow(site: Numbers, _: list[Numbers]) -> list[Scene]:
     return [Scene(numbers, box, ("west", "east", "south", "north"))]
 
 
+_OPEN: Final[Ranges] = {
+    "distance": (1.3, 9.0),
+    "facade_height": (0.4, 3.0),
+    "aside": (0.0, 4.0),
+    "raised": (-0.8, 0.8),
+    "width": (0.5, 6.0),
+}
+_LONG: Final[Ranges] = {
+    **_OPEN,
+    "distance": (2.0, 12.0),
+    "aside": (0.0, 7.0),
+    "width": (5.0, 13.0),
+}
+_BROAD: Final[Ranges] = {
+    **_LONG,
+    "distance": (1.3, 4.0),
+    "facade_height": (0.5, 3.5),
+    "aside": (0.0, 5.0),
+}
+_CLOSE: Final[Ranges] = {
+    **_OPEN,
+    "distance": (0.33, 1.3),
+    "aside": (0.0, 2.5),
+    "width": (0.5, 5.0),
+}
+
+
 def _open(site: Numbers, _: list[Numbers]) -> list[Scene]:
     """Return a facade in the open, of any width."""
     box, numbers, up = _facade(site, _modules(site["width"], 6))
     return [Scene({**numbers, "width": box.width / MODULES}, box, up=up)]
+
+
+_ROWS: Final[Ranges] = {
+    "height": (0.3, 1.6),
+    "depth": (0.4, 1.6),
+    "length": (0.6, 2.5),
+    "share": (0.0, 1.0),
+    "shift": (-0.8, 0.8),
+    "gap": (-0.8, 0.8),
+}
 
 
 def _rows(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
@@ -289,6 +386,9 @@ def _rows(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
         )
         scenes.append(Scene({**numbers, **own, "houses": float(len(parts))}, box, others=parts))
     return scenes
+
+
+_CANOPY: Final[Ranges] = {"depth": (0.1, 1.2), "level": (0.25, 0.9), "kind": (0.0, 3.0)}
 
 
 def _canopy(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
@@ -363,6 +463,14 @@ def _pieces(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
+_BEYOND: Final[Ranges] = {
+    "away": (0.08, 0.7),
+    "begin": (0.35, 2.2),
+    "length": (1.0, 4.5),
+    "facade_height": (0.5, 2.0),
+}
+
+
 def _beyond(site: Numbers, _: list[Numbers]) -> list[Scene]:
     """Return a front in the open that begins beyond the charge, nearly in its line."""
     away, begin = _modules(site["away"]), _modules(site["begin"], _NEAREST)
@@ -370,6 +478,15 @@ def _beyond(site: Numbers, _: list[Numbers]) -> list[Scene]:
     front = Box(begin, away, length, 4, high)
     own = _scaled(away=away, begin=begin, facade_height=high, length=length)
     return [Scene(own, front, ("south",))]
+
+
+_SLANT: Final[Ranges] = {
+    "at": (0.33, 3.5),
+    "height": (0.08, 1.2),
+    "length": (0.2, 1.2),
+    "across": (0.0, 1.0),
+    "turn": (0.0, 1.0),
+}
 
 
 def _slant(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
@@ -395,107 +512,70 @@ def _slant(site: Numbers, obstacles: list[Numbers]) -> list[Scene]:
     return scenes
 
 
-def _table() -> Iterator[Family]:
-    near = {**_FACADE, "distance": (1.3, 4.0)}
-    level = {name: own for name, own in near.items() if name != "raised"}
-    yield Family("wall", "a wall before a facade", _FACADE, _WALL, 12, _walls)
-    posts = {
-        "solid": (0.2, 0.85),
-        "size": (0.05, 0.3),
-        "height": (0.08, 0.8),
-        "share": (0.1, 0.9),
-        "length": (1.0, 4.5),
-        "shift": (-0.5, 0.5),
-    }
-    yield Family("posts", "posts or planters in a row", _FACADE, posts, 8, _posts)
-    opposite = {
-        "behind": (0.3, 2.5),
-        "height": (0.15, 2.0),
-        "length": (0.6, 5.0),
-        "shift": (-0.4, 0.4),
-    }
-    yield Family("opposite", "a front behind the charge", near, opposite, 7, _opposite)
-    fronts = {
-        "other": (0.3, 1.5),
-        "height": (0.2, 2.0),
-        "crossing": (-1.5, 1.0),
-        "crossing_at": (0.3, 2.5),
-    }
-    along = {"away": (0.33, 1.4), "facade_height": (0.5, 2.0)}
-    yield Family("street", "a front along a street", along, fronts, 5, _street)
-    tee = {"width": (0.7, 2.6), "height": (0.2, 2.0), "across": (0.1, 1.5), "sides": (0.0, 1.0)}
-    ends = {name: level[name] for name in ("distance", "facade_height")}
-    yield Family("tee", "a facade across the end of a street", ends, tee, 5, _tee)
-    wings = {"depth": (0.2, 2.0), "height": (0.3, 1.6), "sides": (0.0, 1.0)}
-    court = {**level, "distance": (0.9, 3.5), "width": (1.0, 2.6), "aside": (-1.0, 1.0)}
-    yield Family("court", "a court or a re-entrant corner", court, wings, 6, _court)
-    shadow = {
-        "distance": (1.3, 4.0),
-        "height": (0.5, 2.2),
-        "depth": (0.5, 2.5),
-        "width": (0.5, 2.5),
-        "aside": (0.0, 1.2),
-    }
-    yield Family("shadow", "the walls of a block out of sight", shadow, {}, 0, _shadow)
-    rows = {
-        "height": (0.3, 1.6),
-        "depth": (0.4, 1.6),
-        "length": (0.6, 2.5),
-        "share": (0.0, 1.0),
-        "shift": (-0.8, 0.8),
-        "gap": (-0.8, 0.8),
-    }
-    second = {**_FACADE, "distance": (2.0, 5.0)}
-    yield Family("rows", "a second row of houses", second, rows, 7, _rows)
-    canopy = {"depth": (0.1, 1.2), "level": (0.25, 0.9), "kind": (0.0, 3.0)}
-    yield Family("canopy", "a canopy, storeys that project, a podium", near, canopy, 6, _canopy)
-    wide = {**_FACADE, "distance": (1.3, 9.0), "width": (0.5, 6.0), "aside": (0.0, 4.0)}
-    wide = {**wide, "facade_height": (0.4, 3.0), "raised": (-0.8, 0.8)}
-    long = {**wide, "distance": (2.0, 12.0), "width": (5.0, 13.0), "aside": (0.0, 7.0)}
-    yield Family("wide", "a wide facade in the open", long, {}, 0, _open)
-    broad = {**long, "distance": (1.3, 4.0), "facade_height": (0.5, 3.5), "aside": (0.0, 5.0)}
-    yield Family("broad", "a wide facade near the charge", broad, {}, 0, _open)
-    raised = {**_FACADE, "raised": (0.05, 1.2)}
-    yield Family("raised", "a raised charge, without and with a wall", raised, _WALL, 5, _raised)
-    yield Family("open", "a facade in the open", wide, {}, 0, _open)
-    far = {**_FACADE, "distance": (5.0, 14.0), "facade_height": (0.4, 2.0), "raised": (-0.8, 0.4)}
-    low = {**_WALL, "height": (0.05, 1.0), "share": (0.02, 0.95), "second": (-1.0, 0.0)}
-    yield Family("far", "a wall before a facade far away", far, low, 6, _walls)
-    distant = {**_PIECES, "high": (0.05, 0.8), "share": (0.02, 0.6), "second": (-0.2, 0.3)}
-    title = "pieces before a facade far away"
-    yield Family("distant", title, {**far, "raised": (-0.8, 0.0)}, distant, 6, _pieces)
-    close = {**wide, "distance": (0.33, 1.3), "width": (0.5, 5.0), "aside": (0.0, 2.5)}
-    yield Family("near", "a facade near the charge", close, {}, 0, _open)
-    yield Family("pieces", "pieces of two heights, in one row or two", near, _PIECES, 9, _pieces)
-    close = {**_PIECES, "length": (0.3, 1.8), "share": (0.72, 0.99), "second": (-3.0, 0.9)}
-    close = {**close, "high": (0.15, 1.2), "wing": (-1.0, 0.0)}
-    yield Family("shaft", "pieces just before a facade", near, close, 9, _pieces)
-    past = {"away": (0.08, 0.7), "begin": (0.35, 2.2), "length": (1.0, 4.5)}
-    past = {**past, "facade_height": (0.5, 2.0)}
-    yield Family("beyond", "a facade beside whose end the charge stands", past, {}, 0, _beyond)
-    along = {**along, "begin": (-1.0, 1.5)}
-    slant = {
-        "at": (0.33, 3.5),
-        "height": (0.08, 1.2),
-        "length": (0.2, 1.2),
-        "across": (0.0, 1.0),
-        "turn": (0.0, 1.0),
-    }
-    yield Family("slant", "a wall before a front along the way", along, slant, 6, _slant)
-    yard = {"distance": (0.9, 5.0), "facade_height": (0.5, 2.6), "width": (0.6, 4.5)}
-    yard = {**yard, "aside": (-1.0, 1.0), "depth": (0.4, 1.5)}
-    around = {
-        "opposite": (-1.5, 1.7),
-        "wing": (-1.0, 0.9),
-        "next": (-1.8, 1.8),
-        "house": (-1.0, 0.6),
-        "kind": (0.3, 7.0),
-        "share": (0.0, 1.0),
-        "draw": (0.0, 1.0),
-    }
-    title = "pieces between several buildings"
-    yield Family("yard", title, yard, around, 9, yard_scenes)
+_LOW_WALL: Final[Ranges] = {
+    **_WALL,
+    "height": (0.05, 1.0),
+    "share": (0.02, 0.95),
+    "second": (-1.0, 0.0),
+}
+_DISTANT: Final[Ranges] = {
+    **_PIECES,
+    "high": (0.05, 0.8),
+    "share": (0.02, 0.6),
+    "second": (-0.2, 0.3),
+}
+_SHAFT: Final[Ranges] = {
+    **_PIECES,
+    "high": (0.15, 1.2),
+    "length": (0.3, 1.8),
+    "share": (0.72, 0.99),
+    "second": (-3.0, 0.9),
+    "wing": (-1.0, 0.0),
+}
+_YARD: Final[Ranges] = {
+    "distance": (0.9, 5.0),
+    "facade_height": (0.5, 2.6),
+    "width": (0.6, 4.5),
+    "aside": (-1.0, 1.0),
+    "depth": (0.4, 1.5),
+}
+_AROUND: Final[Ranges] = {
+    "opposite": (-1.5, 1.7),
+    "wing": (-1.0, 0.9),
+    "next": (-1.8, 1.8),
+    "house": (-1.0, 0.6),
+    "kind": (0.3, 7.0),
+    "share": (0.0, 1.0),
+    "draw": (0.0, 1.0),
+}
+_SECOND: Final[Ranges] = {**_FACADE, "distance": (2.0, 5.0)}
+_RAISED: Final[Ranges] = {**_FACADE, "raised": (0.05, 1.2)}
+_DEEP: Final[Ranges] = {**_FAR, "raised": (-0.8, 0.0)}
+_PAST: Final[Ranges] = {**_ALONG, "begin": (-1.0, 1.5)}
 
+_ALL: Final = (
+    Family("wall", "a wall before a facade", _FACADE, _WALL, 12, _walls),
+    Family("posts", "posts or planters in a row", _FACADE, _POSTS, 8, _posts),
+    Family("opposite", "a front behind the charge", _NEAR, _OPPOSITE, 7, _opposite),
+    Family("street", "a front along a street", _ALONG, _STREET, 5, _street),
+    Family("tee", "a facade across the end of a street", _ENDS, _TEE, 5, _tee),
+    Family("court", "a court or a re-entrant corner", _COURT, _WINGS, 6, _court),
+    Family("shadow", "the walls of a block out of sight", _SHADOW, {}, 0, _shadow),
+    Family("rows", "a second row of houses", _SECOND, _ROWS, 7, _rows),
+    Family("canopy", "a canopy, storeys that project, a podium", _NEAR, _CANOPY, 6, _canopy),
+    Family("wide", "a wide facade in the open", _LONG, {}, 0, _open),
+    Family("broad", "a wide facade near the charge", _BROAD, {}, 0, _open),
+    Family("raised", "a raised charge, without and with a wall", _RAISED, _WALL, 5, _raised),
+    Family("open", "a facade in the open", _OPEN, {}, 0, _open),
+    Family("far", "a wall before a facade far away", _FAR, _LOW_WALL, 6, _walls),
+    Family("distant", "pieces before a facade far away", _DEEP, _DISTANT, 6, _pieces),
+    Family("near", "a facade near the charge", _CLOSE, {}, 0, _open),
+    Family("pieces", "pieces of two heights, in one row or two", _NEAR, _PIECES, 9, _pieces),
+    Family("shaft", "pieces just before a facade", _NEAR, _SHAFT, 9, _pieces),
+    Family("beyond", "a facade beside whose end the charge stands", _BEYOND, {}, 0, _beyond),
+    Family("slant", "a wall before a front along the way", _PAST, _SLANT, 6, _slant),
+    Family("yard", "pieces between several buildings", _YARD, _AROUND, 9, yard_scenes),
+)
 
-FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _table()})
+FAMILIES: Final[Mapping[str, Family]] = MappingProxyType({own.name: own for own in _ALL})
 """The families by name."""
