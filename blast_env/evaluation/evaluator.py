@@ -4,24 +4,26 @@ import dataclasses
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import repeat
 from math import nan
 from operator import attrgetter
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, Self, TypeVar
 
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.evaluation.engines.contract import BlastDrawing, EngineBlast
 from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts_digest
 from blast_env.evaluation.store import BlastStore
-from blast_env.geometry import Element, Layout
+from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.layout.placement import LegalLayout, load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
-from blast_env.site import AnyCharge, AnyScenario, find_scenario
+from blast_env.site import AnyScenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.units import PA_PER_PSI
 
@@ -121,7 +123,7 @@ class BlastEvaluator:
         self,
         pairs: Iterable[tuple[Sequence[Element], LoadCase]],
         processes: int = 1,
-        progress: Callable[[float], None] | None = None,
+        progress: ProgressCallback | None = None,
     ) -> list[BlastLoads]:
         """Return the loads of many blasts, in the order of the pairs.
 
@@ -149,54 +151,17 @@ class BlastEvaluator:
         """
         if not self.engine.is_complete:
             return list(map(BlastRecord, self.loads_of_many(pairs, processes, progress)))
-        asked, keys, layouts = self._asked(pairs, processes)
-        # 1. What is stored. A drawing needs the blast itself, so then all of them run.
-        stored = (
-            {}
-            if drawing is not None
-            else {key: self.store.record(key, self.scenario) for key in asked}
-        )
-        found = {key: record for key, record in stored.items() if record is not None}
-        missing = {
-            key: EngineBlast(self.scenario, key.layout, charge, key.seed)
-            for key, charge in asked.items()
-            if key not in found
-        }
-        # 2. The others; a drawing stays in this process, because it collects pictures here.
-        if processes > 1 and drawing is None:
-            ran = as_completed(self.engine.record, list(missing.values()), processes)
-        else:
-            parts = [share_of(progress, k, len(missing)) for k in range(len(missing))]
-            ran = (
-                (number, self.engine.record(blast, parts[number], drawing))
-                for number, blast in enumerate(missing.values())
-            )
-        # 3. Each is kept when it has run, so that an interruption loses only those under way.
-        names = list(missing)
-        for done, (number, record) in enumerate(ran, start=1):
-            found[names[number]] = record
-            self._keep(names[number], record)
-            if progress is not None:
-                progress(1.0 - (len(missing) - done) / len(missing))
-        self.counts.cache_hits += len(keys) - len(missing)
-        # 4. Measures need no blast: one record answers for its layout with any of them.
-        return [
-            replace(found[key], loads=self.responding(found[key].loads, layout))
-            for key, layout in zip(keys, layouts, strict=True)
-        ]
-
-    def _asked(
-        self, pairs: Iterable[tuple[Sequence[Element], LoadCase]], processes: int
-    ) -> tuple[dict[BlastKey, AnyCharge], list[BlastKey], list[Layout]]:
-        """Return the charge of each blast by its key, and the key and the layout of each pair."""
         check_workers("processes", processes)
-        asked: dict[BlastKey, AnyCharge] = {}
-        keys, layouts = [], []
-        for layout, threat in pairs:
-            layouts.append(tuple(check_layout(self.scenario, layout)))
-            keys.append(self.key(layout, threat))
-            asked.setdefault(keys[-1], threat.charge)
-        return asked, keys, layouts
+        asked = [(self, layout, threat) for layout, threat in pairs]
+        # A drawing needs the blast itself, so then all of them run.
+        find = BlastStore.record if drawing is None else None
+        run = partial(_records, processes=processes, progress=progress, drawing=drawing)
+        found = _together(asked, find, run, BlastStore.keep, progress)
+        # Measures need no blast: one record answers for its layout with any of them.
+        return [
+            replace(record, loads=self.responding(record.loads, layout))
+            for record, (_, layout, _) in zip(found, asked, strict=True)
+        ]
 
     def responding(self, loads: BlastLoads, layout: Sequence[Element]) -> BlastLoads:
         """Return loads with the response of the facades, where the objective counts that."""
@@ -220,7 +185,8 @@ class BlastEvaluator:
         Raises:
             LayoutError: If the layout does not fit the build zone.
         """
-        self._keep(self.key(layout, threat), BlastRecord(loads))
+        self.counts.blasts += 1
+        self.store.keep(self.key(layout, threat), BlastRecord(loads))
 
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
@@ -232,74 +198,107 @@ class BlastEvaluator:
         site, *_, engine, calibration, code, parts = self._key_of_nothing
         return BlastKey(site, cells, charge, seed, engine, calibration, code, parts)
 
-    def _keep(self, key: BlastKey, record: BlastRecord) -> None:
-        """Count and store a blast."""
-        self.counts.blasts += 1
-        self.store.keep(key, record)
 
+Asked = tuple[BlastEvaluator, Sequence[Element], LoadCase]
+"""The evaluator, the layout and the threat of a blast."""
 
-def _run(
-    asked: Sequence[tuple[BlastKey, BlastEvaluator, EngineBlast]], processes: int
-) -> Iterator[tuple[int, BlastLoads]]:
-    """Run blasts, cache the loads in their evaluators, and yield (index, loads) when done."""
-    if not asked:
-        return
-    engine = asked[0][1].engine
-    # Lots as large as the engine takes less time for than for their parts.
-    firsts = range(0, len(asked), engine.at_once)
-    work = [[blast for *_, blast in asked[first : first + engine.at_once]] for first in firsts]
-    for lot, of_lot in as_completed(engine.loads_at_once, work, processes):
-        for index, loads in enumerate(of_lot, start=firsts[lot]):
-            key, evaluator, _ = asked[index]
-            evaluator.counts.blasts += 1
-            evaluator.store.add(key, loads)
-            yield index, loads
+Kept = TypeVar("Kept", BlastLoads, BlastRecord)
 
 
 def loads_together(
-    asked: Sequence[tuple[BlastEvaluator, Sequence[Element], LoadCase]],
-    processes: int = 1,
-    progress: Callable[[float], None] | None = None,
+    asked: Sequence[Asked], processes: int = 1, progress: ProgressCallback | None = None
 ) -> list[BlastLoads]:
     """Return the loads of blasts on several sites by one engine, run in one batch.
 
     Arguments and errors are those of `BlastEvaluator.loads_of_many`.
     """
-    # (1) A number per blast, equal for equal blasts; (2) what the store has; (3) run the rest, each
-    # blast kept as soon as it is done, so that an interruption loses only those under way; (4) back
-    # in the order asked for.
     check_workers("processes", processes)
+    run = partial(_loads, processes=processes)
+    found = _together(asked, BlastStore.get, run, BlastStore.add, progress)
+    return [
+        evaluator.responding(loads, layout)
+        for loads, (evaluator, layout, _) in zip(found, asked, strict=True)
+    ]
+
+
+def _together(
+    asked: Sequence[Asked],
+    find: Callable[[BlastStore, BlastKey, AnyScenario], Kept | None] | None,
+    run: Callable[[Engine, Sequence[EngineBlast]], Iterator[tuple[int, Kept]]],
+    keep: Callable[[BlastStore, BlastKey, Kept], None],
+    progress: ProgressCallback | None,
+) -> list[Kept]:
+    """Return what is kept of blasts, in the order asked for; each is found, or runs once.
+
+    Args:
+        asked: The blasts, all by one engine.
+        find: Returns what a store has of a blast; `None` if all must run.
+        run: Runs blasts, and yields (index, what is kept) when one is done.
+        keep: Stores that.
+        progress: Called after each blast, with the share of those that run.
+    """
+    # 1. A number per blast, equal for equal blasts, and what the store has.
     distinct: dict[BlastKey, int] = {}  # a hash of a key takes as long as a step of a layout
     numbers: list[int] = []
-    found: dict[int, BlastLoads] = {}
-    missing: dict[int, tuple[BlastKey, BlastEvaluator, EngineBlast]] = {}
+    found: dict[int, Kept] = {}
+    missing: dict[int, tuple[BlastEvaluator, BlastKey]] = {}
+    blasts: list[EngineBlast] = []  # those missing
     for evaluator, layout, threat in asked:
         key = evaluator.key(layout, threat)
         number = distinct.setdefault(key, len(distinct))
         numbers.append(number)
         if number in found or number in missing:
             continue
-        known = evaluator.store.get(key, evaluator.scenario)
+        known = None if find is None else find(evaluator.store, key, evaluator.scenario)
         if known is None:
             # The charge, or the vehicle that carries it to the place in the key.
             cells = key.layout
             if isinstance(layout, LegalLayout) and layout.worst:
                 cells = layout.in_order(cells)
-            blast = EngineBlast(evaluator.scenario, cells, threat.charge, key.seed)
-            missing[number] = key, evaluator, blast
+            missing[number] = evaluator, key
+            blasts.append(EngineBlast(evaluator.scenario, cells, threat.charge, key.seed))
         else:
             found[number] = known
-    places = list(missing)
-    for done, (index, loads) in enumerate(_run(list(missing.values()), processes), start=1):
-        found[places[index]] = loads
+    if not asked:
+        return []
+    # 2. The others run. Each is kept when done: an interruption loses only those under way.
+    first, places = asked[0][0], list(missing)
+    for done, (index, kept) in enumerate(run(first.engine, blasts), start=1):
+        evaluator, key = missing[places[index]]
+        evaluator.counts.blasts += 1
+        keep(evaluator.store, key, kept)
+        found[places[index]] = kept
         if progress is not None:
-            progress(1.0 - (len(missing) - done) / len(numbers))
-    if asked:
-        asked[0][0].counts.cache_hits += len(numbers) - len(missing)
-    return [
-        evaluator.responding(found[number], layout)
-        for number, (evaluator, layout, _) in zip(numbers, asked, strict=True)
-    ]
+            progress(done / len(missing))
+    first.counts.cache_hits += len(numbers) - len(missing)
+    # 3. Back in the order asked for.
+    return list(map(found.__getitem__, numbers))
+
+
+def _loads(
+    engine: Engine, blasts: Sequence[EngineBlast], processes: int
+) -> Iterator[tuple[int, BlastLoads]]:
+    """Run blasts; yield (index, loads) when done."""
+    # Lots as large as the engine takes less time for than for their parts.
+    firsts = range(0, len(blasts), engine.at_once)
+    lots = [blasts[first : first + engine.at_once] for first in firsts]
+    for lot, of_lot in as_completed(engine.loads_at_once, lots, processes):
+        yield from enumerate(of_lot, start=firsts[lot])
+
+
+def _records(
+    engine: Engine,
+    blasts: Sequence[EngineBlast],
+    processes: int,
+    progress: ProgressCallback | None,
+    drawing: BlastDrawing | None,
+) -> Iterator[tuple[int, BlastRecord]]:
+    """Run blasts; yield (index, record) when done."""
+    if processes > 1 and drawing is None:
+        return as_completed(engine.record, blasts, processes)
+    # A drawing stays in this process, because it collects pictures here.
+    parts = [share_of(progress, index, len(blasts)) for index in range(len(blasts))]
+    return enumerate(map(engine.record, blasts, parts, repeat(drawing)))
 
 
 def engine_text(engine: Engine) -> str:
