@@ -122,6 +122,24 @@ def same(first: Any, second: Any) -> bool:
     return data_equivalence(first, second, exact=True)
 
 
+def batch_as_singles(**options: Any) -> gym.vector.VectorEnv:
+    """Return a batch of three that gave in 12 steps what single environments give."""
+    batch, singles = (
+        gym.make_vec("BlastBarrier-v0", 3, vectorization_mode=mode, **options)
+        for mode in ("vector_entry_point", "sync")
+    )
+    assert batch.action_space == singles.action_space
+    assert batch.single_observation_space == singles.single_observation_space
+    assert same(batch.reset(seed=5)[0], singles.reset(seed=5)[0])
+    batch.action_space.seed(1)
+    for _ in range(12):
+        actions = batch.action_space.sample()
+        one, other = batch.step(actions), singles.step(actions)
+        assert all(same(mine, its) for mine, its in zip(one[:4], other[:4], strict=True))
+        assert same(one[4]["action_mask"], other[4]["action_mask"])
+    return batch
+
+
 def watch(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float], dict]:
     """Return the observations, the rewards and the last information of an episode of a blast."""
     observation, info = env.reset(seed=seed, options=options)

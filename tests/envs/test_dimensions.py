@@ -8,7 +8,7 @@ import pytest
 from sb3_contrib import MaskablePPO
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from tests.envs.small import make, same
+from tests.envs.small import batch_as_singles, make, same
 from tests.evaluation.engines.shade import ShadeEngine
 
 
@@ -72,22 +72,12 @@ def test_parts_that_are_illegal_together_take_the_nearest_place() -> None:
 
 
 def test_a_batch_plays_what_single_environments_play() -> None:
-    options: dict[str, Any] = {
-        "scenario": "control_room",
-        "engine": ShadeEngine(),
-        "observation": "features",
-        "action": "dimensions",
-    }
-    batch = gym.make_vec("BlastBarrier-v0", 3, vectorization_mode="vector_entry_point", **options)
-    singles = gym.make_vec("BlastBarrier-v0", 3, vectorization_mode="sync", **options)
-    assert batch.action_space == singles.action_space
-    assert same(batch.reset(seed=5)[0], singles.reset(seed=5)[0])
-    batch.action_space.seed(1)
-    for _ in range(12):
-        actions = batch.action_space.sample()
-        one, other = batch.step(actions), singles.step(actions)
-        assert all(same(mine, its) for mine, its in zip(one[:4], other[:4], strict=True))
-        assert same(one[4]["action_mask"], other[4]["action_mask"])
+    batch = batch_as_singles(
+        scenario="control_room",
+        engine=ShadeEngine(),
+        observation="features",
+        action="dimensions",
+    )
     with pytest.raises(gym.error.InvalidAction, match=r"must be \(3, 3\) integers"):
         batch.step(np.zeros(3, dtype=np.int64))
 

@@ -27,7 +27,14 @@ from blast_env.site import (
 )
 from blast_env.sites import ItemSiteRanges, SiteSource
 from tests.catalogue_sites import yard
-from tests.envs.small import ThinEngine, restricted_scenario, same, small_document, small_scenario
+from tests.envs.small import (
+    ThinEngine,
+    batch_as_singles,
+    restricted_scenario,
+    same,
+    small_document,
+    small_scenario,
+)
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
@@ -185,25 +192,13 @@ def test_generated_sites_have_the_suggestions_of_their_family() -> None:
 @pytest.mark.parametrize("how", [{}, {"threat": "hidden", "threats": 3}])
 @pytest.mark.parametrize("scenario", ["control_room", "hotel_forecourt", "item_sites"])
 def test_a_batch_plays_what_single_environments_play(scenario: str, how: dict[str, Any]) -> None:
-    options: dict[str, Any] = {
-        "scenario": scenario,
-        "engine": ShadeEngine(),
-        "observation": "features",
-        "action": "suggestion",
-    }
-    batch = gym.make_vec(
-        "BlastBarrier-v0", 3, vectorization_mode="vector_entry_point", **options, **how
+    batch_as_singles(
+        scenario=scenario,
+        engine=ShadeEngine(),
+        observation="features",
+        action="suggestion",
+        **how,
     )
-    singles = gym.make_vec("BlastBarrier-v0", 3, vectorization_mode="sync", **options, **how)
-    assert batch.action_space == singles.action_space
-    assert batch.single_observation_space == singles.single_observation_space
-    assert same(batch.reset(seed=5)[0], singles.reset(seed=5)[0])
-    batch.action_space.seed(1)
-    for _ in range(12):
-        actions = batch.action_space.sample()
-        one, other = batch.step(actions), singles.step(actions)
-        assert all(same(mine, its) for mine, its in zip(one[:4], other[:4], strict=True))
-        assert same(one[4]["action_mask"], other[4]["action_mask"])
 
 
 @pytest.mark.parametrize("scenario", [yard(), glazed_yard(), restricted_scenario()])
