@@ -37,6 +37,17 @@ class Column(NamedTuple):
     is_text: bool = False
 
 
+OF_MODULES: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("row", "", "row in the structure's grid, upwards from 0"),
+    Column("column", "", "column in the structure's grid, to the right from 0"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+)
+"""The first columns of a table by modules: which module a row is about."""
+
+
 def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> "pd.DataFrame":
     """Return a data frame of rows, given by the names of the columns, in the columns' order.
 

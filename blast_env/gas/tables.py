@@ -15,7 +15,7 @@ from blast_env.gas.ending import AREA, is_known
 from blast_env.gas.settings import FACE_NAMES, ROOF
 from blast_env.site.blast_site import WALLS, StructureOutline
 from blast_env.statistics import counted_parts, mean_over_area
-from blast_env.tables import Column, as_types, table_of, texts
+from blast_env.tables import OF_MODULES, Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -46,12 +46,7 @@ FACE_COLUMNS: Final = (
 """One row per cell face."""
 
 MODULE_COLUMNS: Final = (
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
-    Column("row", "", "row in the structure's grid, upwards from 0"),
-    Column("column", "", "column in the structure's grid, to the right from 0"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
+    *OF_MODULES,
     Column("face", "", "west, east, south, north, roof or underside"),
     Column("area_m2", "m2", "area of that face over the whole height"),
     *_LOADS,

@@ -11,7 +11,7 @@ from blast_env.particles.balls import CollisionType
 from blast_env.particles.calibration.load_unit import LoadUnit
 from blast_env.particles.run import CollisionArray, incidence_angle_rad
 from blast_env.particles.structure import ModularObstacle
-from blast_env.tables import Column, RunRecord, as_types, texts
+from blast_env.tables import OF_MODULES, Column, RunRecord, as_types, texts
 
 Columns = tuple[Column, ...]
 
@@ -61,12 +61,7 @@ COLLISION_COLUMNS: Final = (
 )
 
 MODULE_COLUMNS: Final = (
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
-    Column("row", "", "row in the structure's grid, upwards from 0"),
-    Column("column", "", "column in the structure's grid, to the right from 0"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
+    *OF_MODULES,
     Column("hits", "", "collisions"),
     Column("impulse_sim", "sim", "sum of m |v| over the collisions"),
     Column("transferred_impulse_sim", "sim", "sum of the momentum really transferred"),
