@@ -32,7 +32,7 @@ _ORIGINS: Final = {
     "street_site_blasts": "streets open at both ends, where a vehicle drives along the fronts",
     "module_site_blasts": "generated sites of single modules, and courts between buildings",
     "liked_site_blasts": "further sites, and layouts that a surrogate and an agent like",
-    "further_site_blasts": "further courts, short fronts and streets, and such layouts",
+    "further_site_blasts": "further kerbs, streets, courts and short fronts, and such layouts",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)
