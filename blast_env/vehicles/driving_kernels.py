@@ -50,9 +50,9 @@ def spread(
         slow_most: The largest label on an arc over slow places.
         spot_most: The largest label of a turn on the spot.
     """
-    count, rows, columns = labels.shape
+    count = len(labels)
     changed = labels >= np.float32(0.0)
-    spots = np.full((rows, columns), NEVER)
+    spots = np.full(is_open.shape, NEVER)
     spot_limit = np.float32(spot_most)  # in the precision of labels, else the loop would not end
     slow_limit = np.float32(slow_most)
     arcs = np.searchsorted(of[:, 0], np.arange(count + 1))
@@ -60,60 +60,125 @@ def spread(
     # end of its line; then the arcs; repeat until no label grows.
     while changed.any():
         for number in range(count):
-            x, y = directions[number]
-            for i in range(rows):
-                row = i if y >= 0 else rows - 1 - i
-                if not changed[number, row].any():
+            _sweep(
+                number,
+                directions[number],
+                lengths[number],
+                is_open,
+                is_wide,
+                most,
+                spot_limit,
+                spots,
+                labels,
+                changed,
+            )
+            own = range(arcs[number], arcs[number + 1])
+            _follow_arcs(
+                number,
+                own,
+                of,
+                ends,
+                arc_lengths,
+                first,
+                points,
+                arc_most,
+                is_open,
+                is_slow,
+                slow_limit,
+                labels,
+                changed,
+            )
+
+
+@compiled()
+def _sweep(
+    number: int,
+    step: IntArray32,
+    length: np.float32,
+    is_open: BoolArray,
+    is_wide: BoolArray,
+    most: Labels,
+    spot_limit: np.float32,
+    spots: Labels,
+    labels: Labels,
+    changed: BoolArray,
+) -> None:
+    """Take straight steps of one direction along it, and turns on the spot from its places."""
+    count, rows, columns = labels.shape
+    x, y = step
+    for i in range(rows):
+        row = i if y >= 0 else rows - 1 - i
+        if not changed[number, row].any():
+            continue
+        for j in range(columns):
+            column = j if x >= 0 else columns - 1 - j
+            if not changed[number, row, column]:
+                continue
+            label = labels[number, row, column]
+            # A turn on the spot leaves at most this run-up, in all directions.
+            spot = min(label, spot_limit)
+            if is_wide[row, column] and spot > spots[row, column]:
+                spots[row, column] = spot
+                for other in range(count):
+                    if spot > labels[other, row, column]:
+                        labels[other, row, column] = spot
+                        changed[other, row, column] = True
+            up, right = row + y, column + x
+            if not (0 <= up < rows and 0 <= right < columns and is_open[up, right]):
+                continue
+            # The run-up grows by the step, up to what the speed limit there allows.
+            value = min(label + length, most[up, right])
+            if value > labels[number, up, right] and _is_passed(is_open, row, column, x, y):
+                labels[number, up, right] = value
+                changed[number, up, right] = True
+
+
+@compiled()
+def _follow_arcs(
+    number: int,
+    own: range,
+    of: IntArray32,
+    ends: IntArray32,
+    arc_lengths: Labels,
+    first: IntArray32,
+    points: IntArray32,
+    arc_most: Labels,
+    is_open: BoolArray,
+    is_slow: BoolArray,
+    slow_limit: np.float32,
+    labels: Labels,
+    changed: BoolArray,
+) -> None:
+    """Take the arcs `own` that begin in one direction, from all places with a new label."""
+    _, rows, columns = labels.shape
+    for row in range(rows):
+        if not changed[number, row].any():
+            continue
+        for column in range(columns):
+            if not changed[number, row, column]:
+                continue
+            changed[number, row, column] = False
+            label = labels[number, row, column]
+            for arc in own:
+                other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
+                if not (0 <= up < rows and 0 <= right < columns):
                     continue
-                for j in range(columns):
-                    column = j if x >= 0 else columns - 1 - j
-                    if not changed[number, row, column]:
-                        continue
-                    label = labels[number, row, column]
-                    # A turn on the spot leaves at most this run-up, in all directions.
-                    spot = min(label, spot_limit)
-                    if is_wide[row, column] and spot > spots[row, column]:
-                        spots[row, column] = spot
-                        for other in range(count):
-                            if spot > labels[other, row, column]:
-                                labels[other, row, column] = spot
-                                changed[other, row, column] = True
-                    up, right = row + y, column + x
-                    if not (0 <= up < rows and 0 <= right < columns and is_open[up, right]):
-                        continue
-                    # The run-up grows by the step, up to what the speed limit there allows.
-                    value = min(label + lengths[number], most[up, right])
-                    if value > labels[number, up, right] and _is_passed(is_open, row, column, x, y):
-                        labels[number, up, right] = value
-                        changed[number, up, right] = True
-            for row in range(rows):
-                if not changed[number, row].any():
+                # An arc bounds the speed by its lateral acceleration, hence the run-up.
+                value = min(label + arc_lengths[arc], arc_most[arc])
+                if value <= labels[other, up, right]:
                     continue
-                for column in range(columns):
-                    if not changed[number, row, column]:
-                        continue
-                    changed[number, row, column] = False
-                    label = labels[number, row, column]
-                    for arc in range(arcs[number], arcs[number + 1]):
-                        other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
-                        if not (0 <= up < rows and 0 <= right < columns):
-                            continue
-                        # An arc bounds the speed by its lateral acceleration, hence the run-up.
-                        value = min(label + arc_lengths[arc], arc_most[arc])
-                        if value <= labels[other, up, right]:
-                            continue
-                        # Every place along the arc must be open; slow ground on it bounds the speed
-                        # at its end.
-                        for point in range(first[arc], first[arc + 1]):
-                            v, u = row + points[point, 1], column + points[point, 0]
-                            if not (0 <= v < rows and 0 <= u < columns and is_open[v, u]):
-                                value = NEVER
-                                break
-                            if is_slow[v, u]:
-                                value = min(value, slow_limit)
-                        if value > labels[other, up, right]:
-                            labels[other, up, right] = value
-                            changed[other, up, right] = True
+                # Every place along the arc must be open; slow ground on it bounds the speed at its
+                # end.
+                for point in range(first[arc], first[arc + 1]):
+                    v, u = row + points[point, 1], column + points[point, 0]
+                    if not (0 <= v < rows and 0 <= u < columns and is_open[v, u]):
+                        value = NEVER
+                        break
+                    if is_slow[v, u]:
+                        value = min(value, slow_limit)
+                if value > labels[other, up, right]:
+                    labels[other, up, right] = value
+                    changed[other, up, right] = True
 
 
 @compiled(inline="always")
