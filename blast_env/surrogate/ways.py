@@ -471,24 +471,53 @@ def _stop(
                         enter, leave = cut(start_x_m, start_y_m, x_m, y_m, solids, solid)
                     if may_on:
                         enters, leaves = cut(x_m, y_m, end_x_m, end_y_m, solids, solid)
-                    clears, clears_on = enter >= leave, enters >= leaves
-                    if clears and clears_on:
+                    if enter >= leave and enters >= leaves:
                         continue
                     for point in range(first, last):
-                        above = before = stopped[number, point, station, aside]
-                        low_m, end_z_m = by_height_m[point, station], points_m[point, 2]
-                        while above < len(ABOVE_M):
-                            z_m = low_m + ABOVE_M[above]
-                            rise_m, on_m = z_m - start_z_m, end_z_m - z_m
-                            if (
-                                clears or _lowest_m(start_z_m, rise_m, enter, leave) >= height_m
-                            ) and (clears_on or _lowest_m(z_m, on_m, enters, leaves) >= height_m):
-                                break
-                            above += 1
+                        before = stopped[number, point, station, aside]
+                        above = _first_clear(
+                            before,
+                            by_height_m[point, station],
+                            (start_z_m, points_m[point, 2]),
+                            (enter, leave),
+                            (enters, leaves),
+                            height_m,
+                        )
                         if above > before:
                             stopped[number, point, station, aside] = above
                             is_behind[point] = True
         first = last
+
+
+@njit(error_model="numpy")
+def _first_clear(
+    above: int,
+    low_m: float,
+    ends_m: tuple[float, float],
+    there: tuple[float, float],
+    on: tuple[float, float],
+    height_m: float,
+) -> int:
+    """Return the lowest of the detours by a place, from `above` on, that clears a solid.
+
+    Args:
+        above: Number of the first height in `ABOVE_M`.
+        low_m: What these heights count from.
+        ends_m: Height of the charge and of the point.
+        there: Where the way to the place enters and leaves the solid in plan, as `cut` has it.
+        on: The same of the way on to the point.
+        height_m: Height of the solid.
+    """
+    clears, clears_on = there[0] >= there[1], on[0] >= on[1]
+    while above < len(ABOVE_M):
+        z_m = low_m + ABOVE_M[above]
+        rise_m, on_m = z_m - ends_m[0], ends_m[1] - z_m
+        if (clears or _lowest_m(ends_m[0], rise_m, there[0], there[1]) >= height_m) and (
+            clears_on or _lowest_m(z_m, on_m, on[0], on[1]) >= height_m
+        ):
+            break
+        above += 1
+    return above
 
 
 @njit(error_model="numpy")
