@@ -531,6 +531,65 @@ def _put_weights(
     return rows
 
 
+@njit(error_model="numpy")
+def _areas_m2(starts: Any, area_m2: FloatArray) -> FloatArray:
+    """Return the area of the points of each structure."""
+    areas_m2 = np.zeros(len(starts))
+    for structure in range(len(starts)):
+        after = starts[structure + 1] if structure + 1 < len(starts) else len(area_m2)
+        for point in range(starts[structure], after):
+            areas_m2[structure] += area_m2[point]
+    return areas_m2
+
+
+@njit(error_model="numpy", fastmath=FUSED)
+def _put_heard(
+    own: Any,
+    member: int,
+    first_row: int,
+    inputs: int,
+    kept: Any,
+    new: Any,
+    bench: Bench,
+    first_weight: int,
+) -> None:
+    """Put what the pieces of a layout say to a few points, weighted and added up.
+
+    Args:
+        own: The layout; see `put_loads`.
+        member: Number of the network.
+        first_row: The first point.
+        inputs: Numbers before a point's are over and the next one's begin.
+        kept: Messages of the pieces that are kept (members, pieces, rows, length).
+        new: Messages of the new ones.
+        bench: Room for a moment, with the weights of the messages.
+        first_weight: Where those of the member begin.
+    """
+    _, of_kept, rows, length = kept.shape
+    of_new = new.shape[1]
+    at, said, now_said = place(bench.given), place(kept), place(new)
+    weights, lanes = place(bench.weights), lanes_at(at)
+    for number in range(first_row, first_row + ROWS_AT_ONCE):
+        for index in range(0, length, 2 * lanes):
+            low = high = fill(at, np.float32(0.0))
+            by = first_weight + index
+            for piece in own:
+                if piece == 0:
+                    break
+                by_low, by_high = load(weights, by), load(weights, by + lanes)
+                by += length
+                if piece > 0:
+                    entry = ((member * of_kept + piece - 1) * rows + number) * length
+                    low = load(said, entry + index) * by_low + low
+                    high = load(said, entry + index + lanes) * by_high + high
+                else:
+                    entry = ((member * of_new - piece - 1) * rows + number) * length
+                    low = load(now_said, entry + index) * by_low + low
+                    high = load(now_said, entry + index + lanes) * by_high + high
+            store(at, number * inputs + SHARES + index, low)
+            store(at, number * inputs + SHARES + index + lanes, high)
+
+
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def put_loads(
     layouts: Any,
@@ -555,18 +614,11 @@ def put_loads(
     own_frame()
     starts, area_m2 = site.points.starts, site.points.area_m2
     members, rows, width = base.shape
-    of_kept, of_new, length = kept.messages.shape[1], new.messages.shape[1], new.messages.shape[3]
-    points, given = len(area_m2), bench.given
+    points, given, length = len(area_m2), bench.given, new.messages.shape[3]
     at, to, beside = place(given), place(bench.between), place(bench.beyond)
-    said, now_said, sums = place(kept.messages), place(new.messages), place(bench.parts)
-    weights, weight_rows = place(bench.weights), 0
-    lanes, same = lanes_at(at), (0, 0, 0, 0)
+    sums, weight_rows, same = place(bench.parts), 0, (0, 0, 0, 0)
     loads = np.empty(len(starts))
-    areas_m2 = np.zeros(len(starts))
-    for structure in range(len(starts)):
-        after = starts[structure + 1] if structure + 1 < len(starts) else points
-        for point in range(starts[structure], after):
-            areas_m2[structure] += area_m2[point]
+    areas_m2 = _areas_m2(starts, area_m2)
     for layout in range(len(layouts)):
         own = layouts[layout]
         # Nothing is said without a piece: the sums over messages are left out.
@@ -586,25 +638,9 @@ def put_loads(
             structure = 0
             for row in range(0, rows, ROWS_AT_ONCE):
                 # 1. What the pieces say, weighted and added up.
-                for number in range(row, row + ROWS_AT_ONCE):
-                    for index in range(0, 0 if is_bare else length, 2 * lanes):
-                        low = high = fill(at, np.float32(0.0))
-                        by = member * weight_rows * length + index
-                        for piece in own:
-                            if piece == 0:
-                                break
-                            by_low, by_high = load(weights, by), load(weights, by + lanes)
-                            by += length
-                            if piece > 0:
-                                entry = ((member * of_kept + piece - 1) * rows + number) * length
-                                low = load(said, entry + index) * by_low + low
-                                high = load(said, entry + index + lanes) * by_high + high
-                            else:
-                                entry = ((member * of_new - piece - 1) * rows + number) * length
-                                low = load(now_said, entry + index) * by_low + low
-                                high = load(now_said, entry + index + lanes) * by_high + high
-                        store(at, number * inputs + SHARES + index, low)
-                        store(at, number * inputs + SHARES + index + lanes, high)
+                if not is_bare:
+                    by = member * weight_rows * length
+                    _put_heard(own, member, row, inputs, kept.messages, new.messages, bench, by)
                 # 2. Four points through the layers, from memory read once.
                 bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
                 four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)
