@@ -79,11 +79,7 @@ def put_relations(
 ) -> None:
     """Put what `solid_relations` returns into an array."""
     for point in range(len(points_m)):
-        # Points one above the other differ in height alone.
-        is_above = point > 0
-        for axis in range(2):
-            is_above = is_above and points_m[point, axis] == points_m[point - 1, axis]
-            is_above = is_above and outward[point, axis] == outward[point - 1, axis]
+        is_above = point > 0 and _is_above(points_m, outward, point)
         # 1. The axes of a point: ahead along the path in plan, aside to where its wall faces.
         x_m, y_m = points_m[point, 0] - start_m[0], points_m[point, 1] - start_m[1]
         way_m = sqrt(x_m * x_m + y_m * y_m) + 1e-6
@@ -105,6 +101,7 @@ def put_relations(
             ahead_m = ahead_x * from_x + ahead_y * from_y
             there_m = min(max(ahead_m, 0.0), way_m)
             straight_m = start_m[2] + there_m / way_m * (points_m[point, 2] - start_m[2])
+            # 3. The relations in plan, which points one above the other have in common.
             own = found[solid, point]
             if is_above:
                 for number in range(RELATIONS):
@@ -138,6 +135,18 @@ def put_relations(
             over_m = height_m - straight_m
             own[7] = min(max(over_m / scale_m, -_MOST), _MOST)
             own[12] = min(_detour_m(there_m, way_m, max(over_m, 0.0)) / scale_m, _MOST)
+
+
+@njit(error_model="numpy")
+def _is_above(points_m: FloatArray, outward: FloatArray, point: int) -> bool:
+    """Return whether a point differs from the one before it in height alone."""
+    for axis in range(2):
+        if (
+            points_m[point, axis] != points_m[point - 1, axis]
+            or outward[point, axis] != outward[point - 1, axis]
+        ):
+            return False
+    return True
 
 
 @njit(error_model="numpy")
