@@ -42,6 +42,9 @@ VISITS: Final = 1_000
 DRAWN: Final = 16
 """Layouts that the policy draws on a case when it learns from its own ones."""
 
+BEST_DRAWN: Final = 4
+"""The best of these, which become likelier."""
+
 CASES_A_STEP: Final = 4
 """Cases whose draws change the policy at once."""
 
@@ -209,9 +212,10 @@ def reinforced(
 ) -> Weights:
     """Return weights that have learnt from guesses of their own draws on some cases.
 
-    1. On each case the policy draws layouts. What a draw takes off more than their mean, in
-       standard deviations, is its advantage.
-    2. After a few cases, the choices of draws become likelier or less likely by that.
+    1. On each case the policy draws layouts. What the best few take off more than the next one,
+       in standard deviations of all, is their advantage. The others have none: to lower them makes
+       the draws alike, and then the best of many is worse.
+    2. After a few cases, the choices of draws become likelier by that.
 
     Args:
         weights: The weights to begin with.
@@ -258,7 +262,9 @@ def _with_advantages(
     guesses = Guesses.of(surrogate, case_for(scenario, charge))
     loads = guesses.loads([tuple(sorted(layout)) for layout in drawn])
     shares = 1.0 - loads / max(guesses.loads([()]).item(), 1e-9)
-    advantages = (shares - shares.mean()) / max(float(shares.std()), LEAST_SPREAD)
+    least = float(np.sort(shares)[-BEST_DRAWN - 1])
+    ahead = np.maximum(shares - least, 0.0) / max(float(shares.std()), LEAST_SPREAD)
+    advantages = ahead * (DRAWN / (2.0 * BEST_DRAWN))
     for decision in decisions:
         yield _chosen_among(candidates, decision, advantages, rng)
 
