@@ -303,7 +303,6 @@ class GlazingResponses:
     Attributes:
         peak_m: Largest deflection of an unbroken pane, m (panes,).
         break_probability: Share of such panes that break (panes,).
-        break_time_s: Median time of breakage of those that break, s (panes,).
         speed_m_s: Speed of their fragments, m/s; 0 if retained (panes,).
         retained: 1 if an interlayer retains the fragments, else 0 (panes,).
         flight_m: Distance of flight to the floor, m (panes,).
@@ -320,7 +319,6 @@ class GlazingResponses:
 
     peak_m: FloatArray
     break_probability: FloatArray
-    break_time_s: FloatArray
     speed_m_s: FloatArray
     retained: FloatArray
     flight_m: FloatArray
@@ -376,7 +374,7 @@ def glazing_responses(
     for index, pane in enumerate(panes):
         own_s = time_s if time_s.ndim == 1 else time_s[index]
         _bend(pane, own_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
-    peak_m, probability, break_s, *_ = rows.T
+    peak_m, probability, *_ = rows.T
     thrown_by = np.reshape([pane.thrown_by for pane in panes], (len(panes), 5))
     stretched, speed, flight, hit = _thrown(rows, thrown_by)
     retained = stretched <= 1.0
@@ -400,7 +398,6 @@ def glazing_responses(
     return GlazingResponses(
         peak_m,
         probability,
-        break_s,
         speed,
         retained.astype(np.float64),
         flight,

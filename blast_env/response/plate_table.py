@@ -43,14 +43,12 @@ class PlateCurve:
         load: q b^4 / (E h^4) (points,).
         risk: R (points,).
         load_mass_factor: mean(phi^2) / mean(phi) of the shape (points,).
-        load_factor: mean(phi) of the shape (points,).
     """
 
     deflection: FloatArray
     load: FloatArray
     risk: FloatArray
     load_mass_factor: FloatArray
-    load_factor: FloatArray
 
 
 @cache
@@ -63,7 +61,7 @@ def plate_curve(aspect_ratio: float) -> PlateCurve:
     ratios, values = _table()
     columns = np.array(
         [
-            [np.interp(aspect_ratio, ratios, values[:, point, column]) for column in range(4)]
+            [np.interp(aspect_ratio, ratios, values[:, point, column]) for column in range(3)]
             for point in range(values.shape[1])
         ]
     )
@@ -72,7 +70,6 @@ def plate_curve(aspect_ratio: float) -> PlateCurve:
         load=np.exp(columns[:, 0]),
         risk=np.exp(columns[:, 1]),
         load_mass_factor=columns[:, 2],
-        load_factor=columns[:, 3],
     )
 
 
