@@ -24,14 +24,17 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark.methods import reference_of, references_of
 from blast_env.benchmark.references import cell_key, engine_key, stored_references
+from blast_env.bundled import ITEM_SITES, KERB_SITES
 from blast_env.cli.output import user_errors
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import write_atomically
 from blast_env.plots.figures import save_figure
 from blast_env.tables import markdown_table
+from studies.benchmark.choice import FIRST_SEED, METHODS, Candidate, candidates, looked_at
 from studies.benchmark.references import (
     WITHOUT_GUESSES,
+    entered,
     finders,
     known_layouts,
     mean_curve,
@@ -46,6 +49,7 @@ from studies.benchmark.references import (
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 _STORED = Path("blast_env/benchmark/data/references.json")
+_STANDINGS = _STORED.parent / "standings"
 _CELL, _FINE = cell_key(0.5), cell_key(JUDGE_CELL_M)
 _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 
@@ -62,26 +66,29 @@ def references(
 ) -> None:
     """Evaluate the rules and all known layouts on every problem without a reference.
 
+    References of problems that are no longer there go.
+
     A better layout of a judged submission becomes the best known one, which changes the scale of
     the score: give all judged submissions, whose files are then written with the new scale.
     """
     with user_errors():
-        known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
+        stored = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
+        known = {name: own for name, own in stored.items() if name in DEFINITIONS}
         submissions = {path: SubmissionJudgement.load(path) for path in judged or ()}
         published, began = published_blasts(DEFINITIONS), monotonic()
         store = with_published(cache, published)
         engine = find_engine(JUDGE, 0.5)
         for name, definition in DEFINITIONS.items():
-            stored = known.get(name)
+            before = known.get(name)
             made_by = (definition.digest, engine_key(engine))
-            if stored and (stored.digest, stored.engine) == made_by:
+            if before and (before.digest, before.engine) == made_by:
                 continue
             if monotonic() - began > most_s:
                 break
             evaluator = BlastEvaluator(definition.scenario, engine, cache=store)
             more = known_layouts(definition, published)
-            if stored:
-                more = {stored.best.method: stored.best.layout} | more
+            if before:
+                more = {before.best.method: before.best.layout} | more
             known[name] = reference_of(definition, evaluator, more, _CELL)
             best, rule = known[name].best, known[name].rule
             print_line(
@@ -104,6 +111,26 @@ def references(
         for name in DEFINITIONS:
             if better[name] != known[name]:
                 print_line(f"{name}: best known by {better[name].best.method}")
+
+
+@app.command()
+def enter(
+    judged: Annotated[list[Path], typer.Argument(help="Judged submissions.")],
+    out: Annotated[Path, typer.Option(help="Folder of the standings.")] = _STANDINGS,
+) -> None:
+    """Put the runs of judged submissions into the standings, beside the runs that are there.
+
+    Runs of problems that are no longer in the benchmark go from all of them.
+    """
+    with user_errors():
+        kept = {
+            own.method: own for own in map(SubmissionJudgement.load, sorted(out.glob("*.json")))
+        }
+        for path in judged:
+            new = SubmissionJudgement.load(path)
+            kept[new.method] = entered(kept.get(new.method), new)
+        for method, own in kept.items():
+            print_line(str(entered(None, own).save(out / f"{method}.json")))
 
 
 def _write(known: dict[str, ScoreReference], out: Path) -> None:
@@ -151,6 +178,39 @@ def headroom(
         *("methods that find 5 points", "of them without guesses"),
     )
     print_line(markdown_table(headers, rows))
+
+
+@app.command()
+def choose(
+    kind: Annotated[
+        list[str] | None, typer.Option(help="Kind of the sites; may be given again.")
+    ] = None,
+    first: Annotated[int, typer.Option(min=0, help="First seed.")] = FIRST_SEED,
+    sites: Annotated[int, typer.Option(min=1, help="Sites of each kind.")] = 20,
+    blasts: Annotated[int, typer.Option(min=1, help="Blasts of each method.")] = BUDGETS[1],
+    cache: Annotated[Path, typer.Option(help="Folder in which blasts and runs are kept.")] = Path(
+        "out/choice"
+    ),
+) -> None:
+    """Choose generated sites on which several methods find room above the rules, by blasts.
+
+    After an interruption the same line goes on.
+    """
+    with user_errors():
+        store = BlastStore(cache / "blasts")
+        print_line(markdown_table(("problem", "best rule", *METHODS, "chosen"), ()))
+        for definition in candidates(kind or [ITEM_SITES, KERB_SITES], first, sites):
+            seen = looked_at(definition, blasts, cache, store)
+            print_line(f"| {' | '.join(_choice_row(seen))} |")
+
+
+def _choice_row(seen: Candidate) -> tuple[str, ...]:
+    """Return the points beside the best rule by method: of a search's cells, then the judge's."""
+    cells = []
+    for method in METHODS:
+        leads = [of[method] for of in (seen.leads, seen.fine_leads) if method in of]
+        cells.append(", ".join(f"{100.0 * lead:+.1f}" for lead in leads))
+    return (f"`{seen.name}`", seen.rule, *cells, "yes" if seen.has_room else "")
 
 
 @app.command()

@@ -29,6 +29,7 @@ from blast_env.site.sources import source_of
 from blast_env.surrogate import SurrogateEngine
 from blast_env.surrogate.network import packaged_surrogate
 from blast_env.values import generator
+from studies.benchmark.family import SuggestionView, trained
 
 _FIT_EVERY: Final = 5
 """Evaluations between fits of the model's length scales: a fit takes as long as a blast."""
@@ -38,6 +39,9 @@ _STEPS: Final = 4096
 
 _DRAWS: Final = 200
 """Layouts drawn from a trained policy."""
+
+_FAMILY_DRAWS: Final = 64
+"""The same from a policy for all sites: as many as of the packaged agent."""
 
 _GUESSED: Final = 1000
 """Layouts of the search by guesses whose best ones are imitated."""
@@ -153,6 +157,12 @@ def untrained(problem: BenchmarkProblem, seed: int) -> Layout:
     return _of_masked(problem, env, MaskablePPO("MlpPolicy", env, seed=seed, **_SETTINGS), 0)
 
 
+def family_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
+    """MaskablePPO trained once for all sites, on what rules suggest; see `family`."""
+    site = SuggestionView(_environment(problem, "suggestion"))
+    return _best_of(problem, _ranked(_draws(site, _masked(site, trained(seed)), _FAMILY_DRAWS)))
+
+
 @lru_cache(maxsize=128)
 def _of_ppo(definition: Definition, seed: int) -> tuple["Guessed", ...]:
     """Return the ranked draws of PPO: one training, whatever the budget."""
@@ -234,7 +244,7 @@ def _of_masked(
     return _best_of(problem, _ranked(_draws(env, _masked(env, model), _DRAWS)))
 
 
-def _masked(env: BlastBarrierEnv, model: MaskablePPO) -> Predict:
+def _masked(env: BlastBarrierEnv | SuggestionView, model: MaskablePPO) -> Predict:
     return lambda seen, steady: model.predict(
         seen, deterministic=steady, action_masks=env.action_masks()
     )
@@ -244,8 +254,9 @@ Guessed = tuple[Layout, float]
 """A layout and the share of the load that it takes off by the surrogate's guess."""
 
 
-def _draws(env: BlastBarrierEnv, predict: Predict, number: int) -> list[Guessed]:
+def _draws(env: BlastBarrierEnv | SuggestionView, predict: Predict, number: int) -> list[Guessed]:
     """Return the policy's proposal, then random draws."""
+    site = env.site if isinstance(env, SuggestionView) else env
 
     def drawn(*, steady: bool) -> Guessed:
         seen, _ = env.reset(seed=0)
@@ -253,7 +264,7 @@ def _draws(env: BlastBarrierEnv, predict: Predict, number: int) -> list[Guessed]
         while not ended:
             action, _ = predict(seen, steady)
             seen, _, ended, _, info = env.step(np.int64(action))
-        return tuple(sorted(env.placement.layout)), info["reduction"]
+        return tuple(sorted(site.placement.layout)), info["reduction"]
 
     return [drawn(steady=index == 0) for index in range(number + 1)]
 

@@ -26,7 +26,7 @@ from blast_env.benchmark.methods import find_method
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import cell_key
 from blast_env.design.search import layouts_by_rule
-from blast_env.errors import UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.geometry import Layout
@@ -37,7 +37,7 @@ DATA = Path("docs/data")
 _MOST = 50_000  # blasts in memory
 _CLOSE = 0.03
 """Share of the load within which a rule may become the best one with finer cells."""
-_HEADROOM = 0.05
+HEADROOM = 0.05
 """Share of the load that a find takes off beyond the best rule."""
 WITHOUT_GUESSES = ("botorch_turbo", "genetic", "optuna_tpe", "population_annealing", "random")
 """Methods that know of a layout only what its blast says."""
@@ -127,6 +127,29 @@ def rescaled(
     return replace(judged, runs=tuple(runs))
 
 
+def entered(kept: SubmissionJudgement | None, new: SubmissionJudgement) -> SubmissionJudgement:
+    """Return a judged submission of the standings with the runs of another one beside its own.
+
+    A run of the same problem, budget and seed is replaced. Runs of problems that are no longer in
+    the benchmark go.
+
+    Args:
+        kept: The one of the standings, if there is one.
+        new: The other one, of the same method, engine and cells.
+
+    Raises:
+        BlastEnvError: If another engine or other cells judged it.
+    """
+    old = new if kept is None else kept
+    judges = [(own.engine, own.cell_m) for own in (old, new)]
+    if judges[0] != judges[1]:
+        raise BlastEnvError(f"{new.method}: was judged by {judges[1]}, the standings {judges[0]}")
+    runs = {run.key: run for own in (old, new) for run in own.runs if run.problem in DEFINITIONS}
+    order = [*DEFINITIONS]
+    placed = sorted(runs.values(), key=lambda run: (order.index(run.problem), run.budget, run.seed))
+    return replace(new, runs=tuple(placed))
+
+
 def published_blasts(definitions: Mapping[str, Definition]) -> BlastStore:
     """Return the published blasts of these problems."""
     store = BlastStore(size=_MOST)
@@ -214,7 +237,7 @@ def finders(problem: str, submissions: Iterable[SubmissionJudgement]) -> tuple[s
         submission.method
         for submission in submissions
         if any(
-            run.problem == problem and run.budget > 0 and run.rule - run.share >= _HEADROOM
+            run.problem == problem and run.budget > 0 and run.rule - run.share >= HEADROOM
             for run in submission.runs
         )
     )

@@ -217,6 +217,9 @@ SMALLER: Final[dict[str, str]] = {
         "--charges 1 --changes 1 --sites 1"
     ),
     # docs/researchers/benchmark.md
+    "python -m studies.benchmark choose": (
+        "--kind kerb_sites --sites 1 --blasts 2 --cache out/choice_of_two"
+    ),
     "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
         "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),

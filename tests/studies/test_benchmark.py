@@ -16,13 +16,20 @@ from blast_env.benchmark import (
     stored_references,
 )
 from blast_env.benchmark.problem import shares_of
-from blast_env.errors import UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Layout
 from studies.benchmark import methods
 from studies.benchmark.__main__ import app
-from studies.benchmark.references import finders, mean_curve, named_definition, with_judged
+from studies.benchmark.choice import Candidate, are_enough, candidates
+from studies.benchmark.references import (
+    entered,
+    finders,
+    mean_curve,
+    named_definition,
+    with_judged,
+)
 from tests.benchmark.row import RowEngine
 
 
@@ -93,3 +100,47 @@ def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.Mo
     (run,) = play(methods.imitation, [(lambda _: free, 0, 0)])
     assert run.blasts == free.blasts == 0
     assert run.layout
+
+
+def test_runs_enter_the_standings_beside_those_of_other_seeds() -> None:
+    """The same seed is replaced; a problem that there is no longer goes; judges do not mix."""
+    name = "control_room-known-v2"
+
+    def judged(*runs: tuple[str, int, float], engine: str = "gas") -> SubmissionJudgement:
+        own = (RunJudgement(of, 50, seed, 50, (), share, 0.6, 0.5) for of, seed, share in runs)
+        return SubmissionJudgement("mine", JUDGE_CELL_M, engine, tuple(own))
+
+    kept = judged(("gone", 0, 0.7), (name, 1, 0.7), (name, 0, 0.8))
+    found = entered(kept, judged((name, 1, 0.6), (name, 2, 0.5)))
+    assert [(run.seed, run.share) for run in found.runs] == [(0, 0.8), (1, 0.6), (2, 0.5)]
+    with pytest.raises(BlastEnvError, match="judged by"):
+        entered(kept, judged((name, 1, 0.6), engine="gas 8"))
+
+
+@pytest.mark.parametrize(
+    ("finders", "enough"),
+    [
+        (("genetic", "optuna_tpe", "surrogate"), True),
+        (("genetic", "population_annealing", "optuna_tpe"), True),
+        (("genetic", "surrogate", "imitation"), False),
+        (("genetic", "optuna_tpe"), False),
+    ],
+)
+def test_guesses_alone_choose_no_site(finders: tuple[str, ...], enough: bool) -> None:
+    assert are_enough(finders) is enough
+
+
+def test_a_site_has_room_with_both_sizes_of_the_cells() -> None:
+    three = {"genetic": 0.03, "population_annealing": 0.05, "optuna_tpe": 0.03}
+    assert Candidate("a", "ring", three, three).has_room
+    assert not Candidate("a", "ring", three, {**three, "genetic": 0.02}).has_room
+    assert not Candidate("a", "ring", three, dict.fromkeys(three, 0.04)).has_room
+    assert not Candidate("a", "ring", three).has_room
+
+
+def test_candidates_are_in_the_order_of_their_seeds() -> None:
+    names = [own.name for own in candidates(("item_sites", "kerb_sites"), 5, 2)]
+    sites = ("item_sites_5", "kerb_sites_5", "item_sites_6", "kerb_sites_6")
+    assert names == [f"{site}-known-v2" for site in sites]
+    with pytest.raises(UnknownNameError, match="did you mean 'item_sites'"):
+        list(candidates(("item_site",), 5, 2))

@@ -29,7 +29,7 @@ def test_splits_have_ends() -> None:
     assert tasks.count("test") == 0
     assert tasks.problem("benchmark", 0).name == next(iter(DEFINITIONS))
     for split, index, message in (
-        ("benchmark", len(DEFINITIONS), "index is 12"),
+        ("benchmark", len(DEFINITIONS), "index is 11"),
         ("train", -1, "index is -1"),
         ("trial", 0, "no split 'trial'"),
     ):
@@ -42,7 +42,7 @@ def test_splits_have_ends() -> None:
 def test_resets_go_on_from_the_first() -> None:
     tasks = Tasks()
     assert tasks.resets("benchmark", 3)[2:] == tasks.resets("benchmark", 1, first=2)
-    with pytest.raises(BlastEnvError, match="index is 12"):
+    with pytest.raises(BlastEnvError, match="index is 11"):
         tasks.resets("benchmark", 2, first=len(DEFINITIONS) - 1)
 
 
