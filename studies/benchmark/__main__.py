@@ -234,7 +234,8 @@ def picture(
         blasts = np.arange(budget + 1)
         for method in methods:
             runs = [run for run in method.runs if run.budget == budget]
-            curves[method.method] = mean_curve(runs, rules, blasts)
+            if runs:
+                curves[method.method] = mean_curve(runs, rules, blasts)
         for index, name in enumerate(sorted(curves, key=lambda curve: -curves[curve][-1])):
             line = "-" if index < 10 else "--"  # the colours repeat after ten
             axes.step(blasts, curves[name], where="post", label=name, linestyle=line)

@@ -213,17 +213,19 @@ def seen_rule(name: str, cache: Path | None) -> float:
 def mean_curve(runs: Sequence[Run], rules: Mapping[str, float], blasts: IntArray) -> FloatArray:
     """Return the mean points beside the best rule after numbers of blasts, 0 before a layout.
 
+    Each problem counts once, whatever the number of its runs.
+
     Args:
         runs: The runs.
         rules: Share of the load that the best rule leaves, by problem.
         blasts: The numbers (blasts,).
     """
-    points = []
+    points: dict[str, list[FloatArray]] = defaultdict(list)
     for run in runs:
         spent, shares = np.array([(0, rules[run.problem]), *run.curve]).T
         by_then = shares[np.searchsorted(spent, blasts, side="right") - 1]
-        points.append(100.0 * (rules[run.problem] - by_then))
-    mean: FloatArray = np.mean(points, axis=0)
+        points[run.problem].append(100.0 * (rules[run.problem] - by_then))
+    mean: FloatArray = np.mean([np.mean(own, axis=0) for own in points.values()], axis=0)
     return mean
 
 
