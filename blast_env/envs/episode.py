@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -53,8 +53,6 @@ _NO_CHARGE: Final = Charge((0.0, 0.0), 0.0)
 _NOTHING: Final = Assessment(0.0, 0.0, 0.0, 0.0, False)
 _FINISHES, _CHOOSES, _ILLEGAL = -1, -2, -3
 """In the place of an element's number: the action finishes, is a choice, or has no effect."""
-
-_NO_ACTION: Final = -1
 
 _MOST_SHOWN: Final = 64
 """Most charges of a site for which the constant observations are kept."""
@@ -338,6 +336,13 @@ def _outcome(
     }
 
 
+@cache
+def _kernels() -> Any:
+    from blast_env.envs import turn_kernels  # Numba takes long to import
+
+    return turn_kernels
+
+
 class Episodes:
     """Episodes of one task side by side, each begun again when it has ended.
 
@@ -369,10 +374,9 @@ class Episodes:
         self.code = task.actions.code(catalogue, first.actions.finish + 1)
         self.layouts = LayoutBatch(first.empty, first.rules, count)
         self.ended: BoolArray = np.zeros(count, dtype=np.bool_)
-        self._begins: BoolArray = np.ones(count, dtype=np.bool_)  # the last action was the first
-        self._has_begun: BoolArray = np.zeros(count, dtype=np.bool_)
-        self._before: IntArray = np.zeros(count, dtype=np.int64)  # elements before the last action
-        self._repeated: IntArray = np.full(count, _NO_ACTION)  # the last one, if without effect
+        self._turns_made: IntArray = np.zeros(count, dtype=np.int64)
+        self._before: IntArray = np.zeros(count, dtype=np.int64)  # elements before the last turn
+        self._without_effect: dict[int, int] = {}  # those of the last actions that had none
         self._turns: dict[int, Transition] = {}  # the last ones, for a reward that asks for them
         self._ended_now: list[int] = []
         reward, names = task.reward, task.reward.terms(task.source.representative)
@@ -424,10 +428,13 @@ class Episodes:
             if index == len(self.running):
                 self.running.append(episode)
             self.running[index] = episode
-        chosen = np.array(indices)
-        self.ended[chosen] = self._has_begun[chosen] = False
-        self._repeated[chosen] = _NO_ACTION
-        self.terms[chosen] = 0.0
+            self._without_effect.pop(index, None)
+        rows = self._rows(indices)
+        self.ended[rows], self._turns_made[rows], self.terms[rows] = False, 0, 0.0
+
+    def _rows(self, indices: Sequence[int] | IntArray) -> slice | Sequence[int] | IntArray:
+        """Return an index of some episodes in arrays: of all of them one that copies nothing."""
+        return slice(None) if len(indices) == len(self.running) else indices
 
     def _drawn(
         self, rng: np.random.Generator, options: ResetOptions
@@ -453,32 +460,23 @@ class Episodes:
             indices: The episodes.
             actions: One of its `ActionNumbers` for each.
         """
-        chosen, layouts = np.array(indices), self.layouts
-        rows = slice(None) if len(chosen) == len(self.running) else chosen  # all without copies
-        wanted = np.array(actions)
+        chosen, wanted = np.array(indices), np.asarray(actions, dtype=np.int64)
+        layouts, rows = self.layouts, self._rows(chosen)
         # 1. What the actions do; the masks are those before them.
         found = self._all_made(chosen, wanted)
-        self._before[rows] = layouts.placed[rows]
-        self._begins[rows] = ~self._has_begun[rows]
-        self._has_begun[rows] = True
-        # 2. Elements are placed, in all layouts at once.
+        self._turns_made[rows] += 1
+        if self._of_turns is not None:
+            self._before[rows] = layouts.placed[rows]
+        # 2. Elements are placed, in all layouts at once. Other actions may end their episodes.
         places = found >= 0
-        if places.all():
+        without_effect, self._without_effect = self._without_effect, {}
+        if np.count_nonzero(places) == len(places):
             layouts.place(chosen, found)
+            ended = layouts.is_full[rows]
         else:
             layouts.place(chosen[places], found[places])
-        # 3. Illegal actions change nothing. Repeated, or too many, they end the episode: a policy
-        # that is deterministic would repeat one for ever.
-        stops, illegal = found == _FINISHES, found == _ILLEGAL
-        for position in illegal.nonzero()[0].tolist():
-            index = indices[position]
-            episode = self.running[index]
-            episode.without_effect += 1
-            repeats = self.task.illegal.moves and wanted[position] == self._repeated[index]
-            stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
-        # 4. Who has finished or filled the zone, and the final layouts.
-        self._repeated[rows] = np.where(illegal, wanted, _NO_ACTION)
-        ended = stops | layouts.is_full[rows]
+            ended = layouts.is_full[rows] | self._stops(chosen, wanted, found, without_effect)
+        # 3. Who has finished or filled the zone, and the final layouts.
         self.ended[rows] = ended
         self._ended_now = chosen[ended].tolist()
         for index in self._ended_now:
@@ -487,6 +485,29 @@ class Episodes:
             self._find_worst_places()
         if self._of_turns is not None:
             self._turns = {index: self._turn(index) for index in indices}
+
+    def _stops(
+        self, chosen: IntArray, wanted: IntArray, found: IntArray, before: Mapping[int, int]
+    ) -> BoolArray:
+        """Return which actions that place nothing end their episodes, and note illegal ones.
+
+        Args:
+            chosen: The episodes (n,).
+            wanted: The actions (n,).
+            found: What they do, as `_all_made` returns it (n,).
+            before: The actions before them that had no effect, by episode.
+        """
+        stops: BoolArray = found == _FINISHES
+        # Illegal actions change nothing. Repeated, or too many, they end the episode: a policy that
+        # is deterministic would repeat one for ever.
+        for position in (found == _ILLEGAL).nonzero()[0].tolist():
+            index, action = int(chosen[position]), int(wanted[position])
+            episode = self.running[index]
+            episode.without_effect += 1
+            repeats = self.task.illegal.moves and before.get(index) == action
+            stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
+            self._without_effect[index] = action
+        return stops
 
     def _find_worst_places(self) -> None:
         """Find the worst places of vehicles against the final layouts, which have them then."""
@@ -504,7 +525,7 @@ class Episodes:
         earlier = after
         if before < len(after):
             earlier = LegalLayout.of(after.scenario, after[:before])
-        ends = bool(self._begins[index]), bool(self.ended[index])
+        ends = bool(self._turns_made[index] == 1), bool(self.ended[index])
         objective = episode.site.empty.scenario.objective
         return Transition(objective, episode.initial, earlier, after, *ends)
 
@@ -514,14 +535,11 @@ class Episodes:
         It is the number of the element to place, `_FINISHES`, `_CHOOSES` or `_ILLEGAL`.
         """
         actions = self.running[chosen[0]].shown.actions
-        found: IntArray
+        found: IntArray = np.full(len(chosen), _ILLEGAL)
         if actions.are_plain:  # the usual case, without the time to make a choice
-            cells = np.minimum(wanted, actions.finish - 1)
-            is_legal = self.layouts.legal.reshape(len(self.running), -1)[chosen, cells]
-            found = np.where(is_legal, wanted, _ILLEGAL)
-            found[wanted == actions.finish] = _FINISHES
-        else:
-            found = np.full(len(chosen), _ILLEGAL)
+            legal, ends = self.layouts.legal, (_FINISHES, _ILLEGAL)
+            if not _kernels().put_placed(chosen, wanted, legal, *ends, found):
+                return found
         for position in (found == _ILLEGAL).nonzero()[0].tolist():
             found[position] = self._made(int(chosen[position]), int(wanted[position]))
         return found
@@ -590,19 +608,19 @@ class Episodes:
         Raises:
             BlastEnvError: If the terms differ from those that the reward names.
         """
-        chosen = np.asarray(indices)
-        rows = slice(None) if len(chosen) == len(self.running) else chosen
+        chosen, rows = np.asarray(indices), self._rows(indices)
         self.terms[rows] = 0.0
         # A reward at the ends pays at the first and the last action alone.
-        paid = chosen if self._of_turns else chosen[self._begins[rows] | self.ended[rows]]
+        pays = self.ended[rows] | (self._turns_made[rows] == 1)
+        paid = chosen if self._of_turns else chosen[pays]
         if len(paid):
             self.terms[paid, :-1] = self._paid(paid)
         # The cost of illegal actions is a term of its own.
-        without_effect = chosen[self._repeated[rows] != _NO_ACTION]
-        if len(without_effect):
+        without_effect = self._without_effect and [i for i in indices if i in self._without_effect]
+        if without_effect:
             self.terms[without_effect, -1] = -self.task.illegal.cost
         rewards: FloatArray = np.zeros(len(chosen))
-        if not len(paid) and not len(without_effect):  # the usual case of one episode
+        if not len(paid) and not without_effect:  # the usual case of one episode
             return rewards
         for of_term in self.terms[rows].T:  # one by one: the same sum of one row or of many
             rewards += of_term
@@ -613,7 +631,7 @@ class Episodes:
         if self._at_ends is not None:
             ended, reductions = self.ended[chosen], np.zeros(len(chosen))
             reductions[ended] = [self.running[index].reduction for index in chosen[ended].tolist()]
-            return self._at_ends.paid(self._begins[chosen], ended, reductions)
+            return self._at_ends.paid(self._turns_made[chosen] == 1, ended, reductions)
         assert self._of_turns is not None
         paid = np.empty((len(chosen), len(self.term_names) - 1))
         for terms, index in zip(paid, chosen.tolist(), strict=True):
@@ -674,7 +692,7 @@ class Episodes:
         """
         actions = self.running[indices[0]].shown.actions
         masks = np.zeros((len(indices), actions.finish + 1), dtype=np.int8)
-        rows = slice(None) if len(indices) == len(self.running) else list(indices)
+        rows = self._rows(indices)
         if actions.are_plain:
             legal = self.layouts.legal[rows]
             masks[:, :-1] = legal.reshape(len(legal), -1)
@@ -686,7 +704,7 @@ class Episodes:
         # An episode that has ended waits for `reset`: one legal action, or masked sampling would
         # fail.
         over = self.ended[rows]
-        if over.any():
+        if np.count_nonzero(over):
             masks[over, :-1], masks[over, -1] = 0, 1
         return self.code.masks(masks)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -178,14 +179,11 @@ class FeaturesEpisode(BatchObservation):
     @staticmethod
     def observe_many(episodes: Sequence["FeaturesEpisode"], placements: Placements) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
-        from blast_env.envs.observation_kernels import put_vectors  # Numba takes long to import
-
         has_items = placements.rules[0].catalogue.has_items
-        distinct = {id(episode): episode for episode in episodes}
-        position = {key: number for number, key in enumerate(distinct)}
-        own = np.array([position[id(episode)] for episode in episodes])
-        constants = np.array([episode.constants for episode in distinct.values()])
-        variants = np.array([episode.variants for episode in distinct.values()])
+        position = {episode: number for number, episode in enumerate(dict.fromkeys(episodes))}
+        own = np.array([position[episode] for episode in episodes])
+        constants = np.array([episode.constants for episode in position])
+        variants = np.array([episode.variants for episode in position])
         _, kinds, rows, columns = placements.legal.shape
         legal = placements.legal.view(np.uint8).reshape(-1, kinds, rows * columns)
         occupancy = placements.occupancy.reshape(-1, rows * columns)
@@ -194,7 +192,7 @@ class FeaturesEpisode(BatchObservation):
             length += placements.left.shape[1] - 1 + (2 + kinds) * rows * columns
         shows_vehicles = episodes[0].observable.shows_vehicles
         vectors = placements.room((len(episodes), length + shows_vehicles))
-        put_vectors(
+        _kernels().put_vectors(
             *(own, constants, variants, placements.left, placements.stock),
             *(placements.budget_left, placements.budget, legal, occupancy, has_items),
             *(FULL_STOCK, _SITE, vectors),
@@ -203,6 +201,13 @@ class FeaturesEpisode(BatchObservation):
             stand_offs = _stand_offs([episode.observable for episode in episodes], placements)
             vectors[:, -1] = np.clip(stand_offs[:, 0], 0.0, 1.0)
         return vectors
+
+
+@cache
+def _kernels() -> Any:
+    from blast_env.envs import observation_kernels  # Numba takes long to import
+
+    return observation_kernels
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> Plane:

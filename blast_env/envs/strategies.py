@@ -321,8 +321,10 @@ class TerminalReward:
 
         Where nothing arrives, all of it counts as taken off.
         """
-        taken_off = np.where(np.isnan(reductions), 1.0, reductions)
-        return np.stack((np.where(begins, -1.0, 0.0), taken_off), axis=1)
+        terms = np.empty((len(begins), 2))
+        terms[:, 0] = np.where(begins, -1.0, 0.0)
+        terms[:, 1] = np.where(np.isnan(reductions), 1.0, reductions)
+        return terms
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from sys import getrefcount
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,8 +167,6 @@ class LayoutBatch:
         """
         if not len(indices):
             return
-        from blast_env.layout.batch_kernels import place  # Numba takes long to import
-
         indices, numbers = np.asarray(indices), np.asarray(numbers)
         arrays = self.legal, self.occupancy, self.table, self.left, self._numbers, self.placed
         # Budgets and access ways are those of a site: layouts on one site at once.
@@ -180,22 +178,20 @@ class LayoutBatch:
                 is_own = sites == site
                 own, added = indices[is_own], numbers[is_own]
             rules = self.rules[own[0]]
-            place(
-                own, added, rules.variants, *arrays, self.budget_left, self.is_full, *rules.limits
-            )
+            limits = self.budget_left, self.is_full, *rules.limits
+            _kernels().place(own, added, rules.variants, *arrays, *limits)
             if rules.zone.access_way is not None:
                 self._keep_open(own, rules.zone.access_way)
 
     def _keep_open(self, indices: IntArray, way: "AccessWay") -> None:
         """Take away places that would close the access way, in layouts of the same rules."""
-        from blast_env.layout.batch_kernels import find_full  # as in `place`
-        from blast_env.vehicles.access_kernels import keep_open
+        from blast_env.vehicles.access_kernels import keep_open  # as in `_kernels`
 
         rules = self.rules[indices[0]]
         sizes = np.ascontiguousarray(rules.variants[:, :2])
         arrays = rules.passable, self.occupancy, sizes
         keep_open(indices, *arrays, way.width_cells, way.is_upwards, self.legal)
-        find_full(indices, self.legal, self.is_full)
+        _kernels().find_full(indices, self.legal, self.is_full)
 
     def elements(self, index: int) -> Layout:
         """Return the elements of a layout, in the order of placement."""
@@ -280,8 +276,14 @@ class LayoutBatch:
         return made
 
 
-@dataclass(frozen=True, eq=False)
-class Placements:
+@cache
+def _kernels() -> Any:
+    from blast_env.layout import batch_kernels  # Numba takes long to import
+
+    return batch_kernels
+
+
+class Placements(NamedTuple):
     """Several layouts, in arrays; see `LayoutBatch` for the other attributes.
 
     Attributes:

@@ -144,9 +144,9 @@ class SurrogateEngine(Engine):
         for number, blast in enumerate(blasts):
             of_sites.setdefault(blast.scenario.content_hash, []).append(number)
         # The first site compiles everything; to listen takes longer than a prediction.
-        compiles = compilation_notice("the surrogate (some 20 s)")
         numbers_of_sites = [*of_sites.values()]
-        with nullcontext() if self._sites else compiles:
+        compiled = "the surrogate (some 20 s)"
+        with nullcontext() if self._sites else compilation_notice(compiled):
             of_all = self._loads_of_sites(blasts, numbers_of_sites)
             for numbers, loads in zip(numbers_of_sites, of_all, strict=True):
                 for number, one in zip(numbers, loads, strict=True):
