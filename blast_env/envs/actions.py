@@ -177,8 +177,8 @@ class Actions(Protocol):
         """Return how agents write the actions, of which there are `count`: as numbers."""
         return Numbers(count)
 
-    def suggestions(self, representative: Scenario) -> tuple[str, ...]:  # noqa: ARG002
-        """Return the rules behind the actions, by title, in their order: none."""
+    def rules(self, representative: Scenario) -> tuple[str, ...]:  # noqa: ARG002
+        """Return the rules that suggest the actions, by title, in their order: none."""
         return ()
 
 
@@ -259,17 +259,18 @@ class RowAcrossSight(Actions):
 
 @dataclass(frozen=True)
 class Suggested(PlaceAtOnce):
-    """The next piece of the layout that one of the rules of thumb proposes, or to finish.
+    """The next piece of what one of the rules of thumb proposes, all its rest, or to finish.
 
-    There is an action for each rule that suits the representative scenario. Again and again it
-    builds the rule's layout; by turns, pieces of several layouts make a new one.
+    There are two actions for each rule that suits the representative scenario: its next piece, and
+    behind those of all rules, all the rest of its layout. By turns, pieces of several layouts make
+    a new one.
     """
 
     def numbered(self, scenario: Scenario, representative: Scenario) -> NumberedActions:
         """Return the suggestions on a site."""
         return Suggestions.of(scenario, representative)
 
-    def suggestions(self, representative: Scenario) -> tuple[str, ...]:
+    def rules(self, representative: Scenario) -> tuple[str, ...]:
         """Return the rules that suit the representative scenario, by title."""
         return tuple(row.title for row in Suggestions.of(representative, representative).rules)
 
@@ -535,12 +536,12 @@ SUGGESTION: Final = (
     "next piece: distance along the line of sight / its length",
     "next piece: distance to the left of that line / 20 m + 0.5",
 )
-"""The values of a suggestion, from 0 to 1; those of the next piece are 0 without one."""
+"""The values of a rule's suggestions, from 0 to 1; those of the next piece are 0 without one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Suggestions:
-    """The suggestions on a site, numbered by the rules, then to finish.
+    """The suggestions on a site: the next piece of each rule, the rest of each, then to finish.
 
     Attributes:
         scenario: The scenario.
@@ -580,7 +581,7 @@ class Suggestions:
     @property
     def finish(self) -> int:
         """The action that finishes."""
-        return len(self.rules)
+        return 2 * len(self.rules)
 
     @property
     def are_plain(self) -> bool:
@@ -588,25 +589,32 @@ class Suggestions:
         return False
 
     def mask(self, chosen: ActionChoice) -> BoolArray:
-        """Return the mask of the rules with a piece that is legal now, and of finishing."""
+        """Return the mask of the rules with a piece that is legal now, twice, and of finishing."""
         mask = np.ones(self.finish + 1, dtype=np.bool_)
-        mask[:-1] = self._legal(chosen).any(axis=1)
+        mask[:-1] = np.tile(self._legal(chosen).any(axis=1), 2)
         return mask
 
     def narrowed(self, chosen: ActionChoice, action: int) -> int | None:
         """Return the number of the next legal piece of a rule's layout; `None` without one.
 
-        A piece that is placed is not legal again.
+        A piece that is placed is not legal again. An action for the rest goes on with what this
+        returns after each piece; see `is_rest`.
         """
-        legal = self._legal(chosen)[action]
-        return int(self.proposals.numbers[action, legal.argmax()]) if legal.any() else None
+        rule = action % len(self.rules)
+        numbers, are_there = self.proposals.numbers[rule], self.proposals.are_there[rule]
+        legal = chosen.possible.ravel()[numbers] & are_there
+        return int(numbers[legal.argmax()]) if legal.any() else None
+
+    def is_rest(self, action: int) -> bool:
+        """Whether an action places all the rest of a layout at once, not its next piece alone."""
+        return len(self.rules) <= action < self.finish
 
     def nearest(self, chosen: ActionChoice, action: int) -> int:  # noqa: ARG002
         """Return to finish: a rule whose layout is complete has had its say."""
         return self.finish
 
     def values(self, chosen: ActionChoice, table: NDArray[np.int8]) -> FloatArray:
-        """Return the values `SUGGESTION` of each suggestion, from 0 to 1 (rules, values).
+        """Return the values `SUGGESTION` of each rule, from 0 to 1 (rules, values).
 
         Args:
             chosen: The choices so far.
@@ -616,7 +624,7 @@ class Suggestions:
         has_next: BoolArray = np.any(legal, axis=1)
         placed = (table.ravel()[proposals.numbers] > 0) & proposals.are_there
         shares = placed.sum(axis=1) / np.maximum(proposals.are_there.sum(axis=1), 1)
-        following = proposals.pieces[np.arange(self.finish), legal.argmax(axis=1)]
+        following = proposals.pieces[np.arange(len(self.rules)), legal.argmax(axis=1)]
         following = following * has_next[:, np.newaxis]
         of_rules = np.stack((has_next, shares, proposals.cut_shares), axis=1)
         return np.concatenate((of_rules, following), axis=1)

@@ -68,11 +68,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
     whose legal place nearest to the line is taken. With `"item_then_place"` or `"item_then_block"`
     the variant comes before the cell.
 
-    `action="suggestion"` has few actions on any site, `Discrete(rules + 1)`: at `reset` each rule
-    of thumb proposes a layout against the charge that is shown, or against all places of a hidden
-    one. An action places the next piece of a rule's layout that is legal, the last one finishes.
-    Repeated, an action builds the rule's layout; by turns they mix what rules propose. A rule that
-    has nothing more to place is masked, and finishes.
+    `action="suggestion"` has few actions on any site, `Discrete(2 * rules + 1)`: at `reset` each
+    rule of thumb proposes a layout against the charge that is shown, or against all places of a
+    hidden one. An action places the next piece of a rule's layout that is legal, or, as many
+    actions further on, all its pieces that are left and legal in their turn; the last one finishes.
+    By turns they mix what rules propose. A rule that has nothing more to place is masked, and
+    finishes.
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
@@ -212,7 +213,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
             mask = spaces.MultiBinary(spaces.flatdim(self.action_space))
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
         elif self.task.shows_suggestions:
-            count = len(self.suggestions) * len(SUGGESTION)
+            count = len(self.task.rules) * len(SUGGESTION)
             self.observation_space = _longer(self.observation_space, count)
         self._display: Display | None = None
         if render_mode is not None:
@@ -271,8 +272,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
 
     @property
     def suggestions(self) -> tuple[str, ...]:
-        """The rules behind the actions of `"suggestion"`, in their order; none of other spaces."""
-        return self.task.suggestions
+        """What the actions of `"suggestion"` place, in their order; nothing of other spaces.
+
+        The title of a rule stands for its next piece; behind all of them come their rests.
+        """
+        rules = self.task.rules
+        return (*rules, *(f"{title}: all the rest" for title in rules))
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (length,); see `ActionCode.masks`.

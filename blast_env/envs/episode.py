@@ -105,14 +105,14 @@ class Task:
     counts: BlastCounts = field(default_factory=BlastCounts)
 
     @cached_property
-    def suggestions(self) -> tuple[str, ...]:
-        """The rules behind the actions, by title, in their order; none of other action spaces."""
-        return self.actions.suggestions(self.source.representative)
+    def rules(self) -> tuple[str, ...]:
+        """The rules that suggest actions, by title, in their order; none of other action spaces."""
+        return self.actions.rules(self.source.representative)
 
     @cached_property
     def shows_suggestions(self) -> bool:
         """Whether the vector `"features"` goes on with the values of suggestions."""
-        return isinstance(self.observation, FeaturesObservation) and bool(self.suggestions)
+        return isinstance(self.observation, FeaturesObservation) and bool(self.rules)
 
     def case(
         self,
@@ -470,12 +470,16 @@ class Episodes:
         # 2. Elements are placed, in all layouts at once. Other actions may end their episodes.
         places = found >= 0
         without_effect, self._without_effect = self._without_effect, {}
-        if np.count_nonzero(places) == len(places):
+        all_place = np.count_nonzero(places) == len(places)
+        if all_place:
             layouts.place(chosen, found)
-            ended = layouts.is_full[rows]
         else:
             layouts.place(chosen[places], found[places])
-            ended = layouts.is_full[rows] | self._stops(chosen, wanted, found, without_effect)
+        if self.task.rules:
+            self._place_rests(chosen[places], wanted[places])
+        ended = layouts.is_full[rows]
+        if not all_place:
+            ended = ended | self._stops(chosen, wanted, found, without_effect)
         # 3. Who has finished or filled the zone, and the final layouts.
         self.ended[rows] = ended
         self._ended_now = chosen[ended].tolist()
@@ -508,6 +512,19 @@ class Episodes:
             stops[position] = repeats or episode.without_effect >= self.task.illegal.limit
             self._without_effect[index] = action
         return stops
+
+    def _place_rests(self, chosen: IntArray, wanted: IntArray) -> None:
+        """Go on where an action places all the rest of a layout, until nothing of it is legal."""
+        pairs = zip(chosen.tolist(), wanted.tolist(), strict=True)
+        going = {index: action for index, action in pairs if self._suggests(index).is_rest(action)}
+        while going:
+            following = {
+                index: self._suggests(index).narrowed(self._choice(index), action)
+                for index, action in going.items()
+            }
+            found = {index: number for index, number in following.items() if number is not None}
+            self.layouts.place([*found], [*found.values()])
+            going = {index: going[index] for index in found}
 
     def _find_worst_places(self) -> None:
         """Find the worst places of vehicles against the final layouts, which have them then."""
@@ -670,10 +687,14 @@ class Episodes:
         return observed
 
     def _suggested(self, index: int) -> FloatArray:
-        """Return the values of the suggestions in an episode, one suggestion after the other."""
+        """Return the values of the rules' suggestions in an episode, one rule after the other."""
+        suggestions = self._suggests(index)
+        return suggestions.values(self._choice(index), self.layouts.table[index]).ravel()
+
+    def _suggests(self, index: int) -> Suggestions:
         suggestions = self.running[index].shown.actions
         assert isinstance(suggestions, Suggestions)
-        return suggestions.values(self._choice(index), self.layouts.table[index]).ravel()
+        return suggestions
 
     def _observed(self, index: int) -> Any:
         episode = self.running[index]

@@ -79,8 +79,9 @@ class FeaturesObservation:
     for those drawn among others with a vehicle, one more value comes last: the stand-off of the
     vehicle with the modules placed so far, as a share of the site's diagonal; 1 without a vehicle.
 
-    With `action="suggestion"` the environment adds seven values for each suggestion, one after the
-    other (`env.unwrapped.suggestions` names them). Those of the next piece are 0 without one:
+    With `action="suggestion"` the environment adds seven values for each rule, one after the other
+    (`env.unwrapped.suggestions` begins with their names). Those of the next piece are 0 without
+    one:
 
     1. has a next piece (1 or 0)
     2. pieces placed / pieces of its layout

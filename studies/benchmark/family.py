@@ -35,7 +35,7 @@ _FINISH: Final = len(_TITLES)
 
 
 class SuggestionView(gym.Wrapper[Any, Any, Any, Any]):
-    """An environment of a site, as what each rule suggests there; rules it lacks are illegal.
+    """An environment of a site, as the next piece of each rule there; rules it lacks are illegal.
 
     Args:
         env: An environment with the action space `"suggestion"` and the observation `"features"`.
@@ -49,7 +49,7 @@ class SuggestionView(gym.Wrapper[Any, Any, Any, Any]):
 
     @cached_property
     def _places(self) -> list[int]:
-        return [_TITLES.index(title) for title in self.site.suggestions]
+        return [_TITLES.index(title) for title in self.site.suggestions if title in _TITLES]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -60,14 +60,15 @@ class SuggestionView(gym.Wrapper[Any, Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Place the next piece of a rule, or finish."""
-        own = self._places.index(int(action)) if action < _FINISH else len(self._places)
+        own = self._places.index(int(action)) if action < _FINISH else self.site.finish
         seen, reward, ended, truncated, info = self.site.step(np.int64(own))
         return self._view(seen), reward, ended, truncated, info
 
     def action_masks(self) -> BoolArray:
         """Return the mask of the rules with a next piece, and of finishing."""
         mask = np.zeros(_FINISH + 1, dtype=np.bool_)
-        mask[[*self._places, _FINISH]] = self.site.action_masks()
+        own = self.site.action_masks()
+        mask[self._places], mask[_FINISH] = own[: len(self._places)], own[-1]
         return mask
 
     def _view(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:

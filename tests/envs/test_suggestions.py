@@ -1,4 +1,4 @@
-"""Suggestions as actions: what the rules propose, piece by piece, and mixed."""
+"""Suggestions as actions: what the rules propose, piece by piece or at once, and mixed."""
 
 from itertools import count
 from typing import Any, Final
@@ -85,10 +85,55 @@ def repeated(env: BlastBarrierEnv, action: int, seed: int, **options: Any) -> La
 def test_a_suggestion_again_and_again_is_the_layout_of_its_rule(name: str) -> None:
     env = suggesting(name)
     rules = rules_for(load_scenario(name))
-    assert env.action_space == gym.spaces.Discrete(len(rules) + 1)
+    assert env.action_space == gym.spaces.Discrete(2 * len(rules) + 1)
     for action, row in enumerate(rules):
         found = repeated(env, action, seed=3)
         assert found == proposed(env, row, shown(env)), row.title
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_all_the_rest_at_first_is_the_layout_of_its_rule_in_one_action(name: str) -> None:
+    env = suggesting(name)
+    rules = rules_for(load_scenario(name))
+    for number, row in enumerate(rules):
+        env.reset(seed=3)
+        _, _, ended, _, info = env.step(len(rules) + number)
+        expected = proposed(env, row, shown(env))
+        assert env.placement.layout == expected, row.title
+        assert info["placed"] == len(expected)
+        assert ended == (not env.placement.legal.any())
+
+
+@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+@pytest.mark.parametrize("scenario", [yard(), glazed_yard(), restricted_scenario(), *SITES])
+def test_all_the_rest_is_the_next_piece_until_there_is_none(scenario: Any, reward: str) -> None:
+    """After the same pieces of any rules: observation, mask, end and the sum of rewards."""
+    at_once, by_pieces = (suggesting(scenario, reward=reward) for _ in range(2))
+    count = len(at_once.suggestions) // 2
+    rng = np.random.default_rng(1)
+    for seed in range(6):
+        at_once.reset(seed=seed)
+        by_pieces.reset(seed=seed)
+        for _ in range(seed % 4):
+            piece = int(rng.choice(np.flatnonzero(at_once.action_masks()[:count])))
+            at_once.step(piece)
+            *_, ended, _, _ = by_pieces.step(piece)
+            if ended:
+                break
+        open_rules = np.flatnonzero(at_once.action_masks()[:count])
+        if not len(open_rules):
+            continue
+        rule = int(rng.choice(open_rules))
+        observation, reward_at_once, ended, _, info = at_once.step(count + rule)
+        paid, was_last = 0.0, False
+        while by_pieces.action_masks()[rule]:
+            other, part, was_last, _, expected = by_pieces.step(rule)
+            paid += float(part)
+        assert at_once.placement.layout == by_pieces.placement.layout
+        assert same(observation, other)
+        assert same(info["action_mask"], expected["action_mask"])
+        assert ended == was_last
+        assert reward_at_once == pytest.approx(paid, abs=1e-12)
 
 
 def test_suggestions_against_a_hidden_threat_are_those_against_all_its_places() -> None:
@@ -114,8 +159,9 @@ def test_the_mask_has_the_rules_with_a_piece_that_may_be_placed_now(scenario: An
                 for layout in layouts
             ]
             mask = env.action_masks()
-            assert mask.tolist() == [*map(bool, legal), True]
-            action = int(rng.choice(np.flatnonzero(mask)))
+            assert mask.tolist() == [*map(bool, legal), *map(bool, legal), True]
+            pieces = np.flatnonzero(mask[: len(rules)])
+            action = int(rng.choice([*pieces, env.finish]))
             _, _, ended, _, info = env.step(action)
             assert np.array_equal(info["action_mask"], env.action_masks())
             if action != env.finish:
@@ -158,6 +204,14 @@ def test_a_rule_that_has_had_its_say_is_masked_and_finishes() -> None:
     _, _, ended, _, info = env.step(action)
     assert (ended, info["placed"], info["invalid_actions"]) == (True, len(layout), 1)
     assert info["reward_terms"]["invalid_actions"] == 0.0
+    # All the rest, twice, is the rule's layout as well.
+    rest = len(env.suggestions) // 2 + action
+    assert repeated(env, rest, seed=0) == layout
+    env.reset(seed=0)
+    env.step(rest)
+    assert not env.action_masks()[[action, rest]].any()
+    _, _, ended, _, info = env.step(rest)
+    assert (ended, info["placed"], info["invalid_actions"]) == (True, len(layout), 1)
 
 
 def test_with_a_penalty_it_costs_instead() -> None:
@@ -176,13 +230,13 @@ def test_generated_sites_have_the_suggestions_of_their_family() -> None:
     env = suggesting(source)
     rules = rules_for(source.representative)
     posts = [row.title for row in rules].index(RULES["line_of_posts"].title)
-    assert env.action_space == gym.spaces.Discrete(len(rules) + 1)
+    assert env.action_space == gym.spaces.Discrete(2 * len(rules) + 1)
     seen = set()
     for seed in count():
         env.reset(seed=seed)
         scenario = env.placement.scenario
         legal = env.action_masks()[:-1]
-        assert legal.tolist() == [bool(proposed(env, row, shown(env))) for row in rules]
+        assert legal.tolist() == 2 * [bool(proposed(env, row, shown(env))) for row in rules]
         assert scenario.vehicles or not legal[posts]
         seen.add(bool(scenario.vehicles))
         if len(seen) == 2:
@@ -207,14 +261,14 @@ def test_a_batch_plays_what_single_environments_play(scenario: str, how: dict[st
 def test_whatever_is_played_ends_in_a_legal_layout(
     scenario: Scenario, data: st.DataObject, seed: int
 ) -> None:
-    """Within the stock, illegal actions included: each action places a piece, or is the last."""
+    """Within the stock, illegal actions included: each action places pieces, or is the last."""
     env = suggesting(scenario)
     env.reset(seed=seed)
     ended, placed = False, 0
     while not ended:
         action = data.draw(st.integers(0, env.finish))
         _, _, ended, _, info = env.step(action)
-        assert info["placed"] == placed + 1 or ended
+        assert info["placed"] > placed or ended
         placed = info["placed"]
     assert placed <= scenario.zone.stock
     check_layout(scenario, env.placement.layout)
@@ -240,15 +294,15 @@ def test_the_space_comes_with_two_objectives() -> None:
 
 
 @pytest.mark.parametrize("name", SITES)
-def test_the_vector_goes_on_with_seven_values_of_each_suggestion(name: str) -> None:
+def test_the_vector_goes_on_with_seven_values_of_each_rule(name: str) -> None:
     env, plain = suggesting(name), suggesting(name, action="place")
     vector, _ = env.reset(seed=3)
     others, _ = plain.reset(seed=3)
-    count = len(env.suggestions)
+    count = len(env.suggestions) // 2
     assert same(vector[: len(others)], others)
     assert vector in env.observation_space
     values = vector[len(others) :].reshape(count, len(SUGGESTION))
-    assert (values[:, 0] == env.action_masks()[:-1]).all()
+    assert (values[:, 0] == env.action_masks()[:count]).all()
     # 1. A layout of two pieces or more, piece by piece: its share rises, the others' may as well.
     action = env.suggestions.index(RULES["wall_near_charge"].title)
     layout = proposed(env, RULES["wall_near_charge"], shown(env))
@@ -293,5 +347,9 @@ def test_only_suggestions_have_names() -> None:
         "wall in the middle",
         "wall near the building",
         "most sight lines cut",
+        "wall near the charge: all the rest",
+        "wall in the middle: all the rest",
+        "wall near the building: all the rest",
+        "most sight lines cut: all the rest",
     )
     assert suggesting("courtyard", action="place").suggestions == ()
