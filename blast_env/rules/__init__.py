@@ -1,11 +1,12 @@
 """Rules of thumb, which place by the site alone, and the table of them."""
 
-from blast_env.rules.posts import ById, line_of_posts, posts_and_wall
+from blast_env.rules.posts import line_of_posts, posts_and_wall
 from blast_env.rules.proposals import Proposals, proposals_for
 from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule
 from blast_env.rules.walls import (
     NEAR_BUILDING,
     NEAR_CHARGE,
+    ById,
     expected_charge,
     hardening_alone,
     hardening_and_sight_lines,

@@ -14,7 +14,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import worst_places
-from blast_env.rules.walls import NEAR_CHARGE, wall_added_to
+from blast_env.rules.walls import NEAR_CHARGE, ById, wall_added_to
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleSource, find_scenario
 from blast_env.units import MODULE_SIDE_M
 
@@ -73,19 +73,6 @@ def posts_and_wall(
     )
     place_m = worst_places(found, source, posts.layout).place_m(0)
     return wall_added_to(posts, place_m, NEAR_CHARGE).layout
-
-
-@dataclass(frozen=True, eq=False)
-class ById:
-    """A scenario as a cache key, compared by identity, because comparison by value is slow."""
-
-    scenario: Scenario
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ById) and other.scenario is self.scenario
-
-    def __hash__(self) -> int:
-        return id(self.scenario)
 
 
 @lru_cache(maxsize=4)

@@ -8,6 +8,7 @@ rules.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import hypot
 from typing import Final, Literal
 
@@ -42,6 +43,19 @@ _TOLERANCE_M: Final = 1e-9
 
 WallKind = Literal["high", "long"]
 """Preferred items of a wall of pieces: the highest, or the longest for their cost."""
+
+
+@dataclass(frozen=True, eq=False)
+class ById:
+    """A scenario as a cache key, compared by identity, because comparison by value is slow."""
+
+    scenario: Scenario
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ById) and other.scenario is self.scenario
+
+    def __hash__(self) -> int:
+        return id(self.scenario)
 
 
 def line_of_sight_wall(
@@ -257,9 +271,14 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         charge: The charge; `None` for a layout against all charges of the scenario.
     """
-    found = find_scenario(scenario)
+    return _sight_lines_on(ById(find_scenario(scenario)), charge)
+
+
+@lru_cache(maxsize=4)
+def _sight_lines_on(very: ById, charge: AnyCharge | None) -> Layout:
+    """Return the layout of `sight_lines`, cached for the two rules that need it."""
     # The lines are those of the known charge; the legal places keep off all possible ones.
-    return visibility_layout(found, Visibility.of(seen_with(found, charge)))
+    return visibility_layout(very.scenario, Visibility.of(seen_with(very.scenario, charge)))
 
 
 def seen_with(scenario: Scenario, charge: AnyCharge | None) -> Scenario:

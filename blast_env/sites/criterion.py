@@ -370,7 +370,8 @@ class _SummedGains:
     def __init__(self, placement: LayoutState, lines: Visibility) -> None:
         self._weight, self._left = lines.weight, np.ones(len(lines.weight), dtype=bool)
         self._possible = placement.legal.reshape(-1)  # what is not legal never becomes so
-        self._cut = _cut_by_variants(lines, placement.catalogue)[:, self._possible]
+        by_variants = _cut_by_variants(lines, placement.catalogue)
+        self._cut = by_variants.compress(self._possible, axis=1)  # line by line, as sums take it
         self._column = np.cumsum(self._possible) - 1
         self._gain = np.zeros(len(self._possible))
         self._gain[self._possible] = _gains(lines.weight, self._cut)
