@@ -14,9 +14,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.sections import PointM
 from blast_env.site import SCHEMA_VERSION, AnySource, RectangleSource, Scenario, VehicleSource
-from blast_env.site.presets import CHARGE_PRESETS
-from blast_env.site.sources import SegmentSource
-from blast_env.site.terraces import ground_below_m
+from blast_env.site.sources import CHARGE_PRESETS, SegmentSource
+from blast_env.site.structures import ground_below_m
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 

@@ -60,7 +60,7 @@ from blast_env.layout import load_layout
 from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario, load_scenario
-from blast_env.site.presets import (
+from blast_env.site.sources import (
     CHARGE_PRESETS,
     EQUIVALENTS_SOURCE,
     PRESETS_SOURCE,

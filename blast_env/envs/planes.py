@@ -28,7 +28,7 @@ from blast_env.geometry import Rectangle
 from blast_env.layout.batch import Placements
 from blast_env.sections import PointM
 from blast_env.site import AnySource, Catalogue, RectangleSource, Scenario
-from blast_env.site.terraces import is_open_below
+from blast_env.site.structures import is_open_below
 from blast_env.units import MODULE_SIDE_M
 
 _POINTS_PER_MODULE: Final = 8  # along a line of possible places of a charge

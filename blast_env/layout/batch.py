@@ -19,7 +19,7 @@ from blast_env.site.zone import BuildZone
 
 if TYPE_CHECKING:
     from blast_env.layout.obstacles import ObstacleTable
-    from blast_env.vehicles.access_way import AccessWay
+    from blast_env.vehicles.vehicle import AccessWay
 
 _MOST_ROOMS: Final = 4
 _NOBODY: Final = 3

@@ -10,11 +10,10 @@ from blast_env.geometry import Element, Layout, standing
 from blast_env.layout.placement import LayoutState, LegalLayout, check_layout, usable_cells
 from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
-from blast_env.site.heights import highest_top_m
-from blast_env.site.structures import ConcreteSquareSection
-from blast_env.site.terraces import ground_below_m
+from blast_env.site.content import highest_top_m
+from blast_env.site.structures import ConcreteSquareSection, ground_below_m
 from blast_env.values import checked_seed
-from blast_env.vehicles.crash_rating import NOTHING, Obstacles
+from blast_env.vehicles.vehicle import NOTHING, Obstacles
 
 if TYPE_CHECKING:  # most sites have no vehicle
     from blast_env.vehicles.drive import Drive

@@ -14,8 +14,7 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout, Measure, Piece, Removal, standing
 from blast_env.layout.placement import check_layout
 from blast_env.site.catalogue import cell_from
-from blast_env.site.files import AnyScenario, find_scenario
-from blast_env.site.models import Scenario
+from blast_env.site.models import AnyScenario, Scenario, find_scenario
 from blast_env.values import path_of
 
 VERSION: Final = 1

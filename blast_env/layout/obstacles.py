@@ -10,9 +10,9 @@ from blast_env.arrays import FloatArray
 from blast_env.geometry import Element, Rectangle, standing
 from blast_env.site.catalogue import Catalogue, Variant, element_text
 from blast_env.site.models import Scenario
-from blast_env.site.terraces import ground_below_m, ground_m
+from blast_env.site.structures import ground_below_m, ground_m
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.crash_rating import (
+from blast_env.vehicles.vehicle import (
     NOTHING,
     OTHER,
     SOLID,
@@ -68,7 +68,7 @@ class ObstacleTable:
 
     Attributes:
         boxes_m: Left, bottom, right and top of each, m (elements, 4).
-        kinds: What each is (elements,); see `blast_env.vehicles.crash_rating`.
+        kinds: What each is (elements,); see `blast_env.vehicles.vehicle`.
     """
 
     def __init__(self, scenario: Scenario, catalogue: Catalogue) -> None:

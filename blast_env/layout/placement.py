@@ -14,8 +14,7 @@ from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece
 from blast_env.site.catalogue import Catalogue, ModulePlace, cell_text, element_text
-from blast_env.site.files import AnyScenario, find_scenario
-from blast_env.site.models import Scenario
+from blast_env.site.models import AnyScenario, Scenario, find_scenario
 from blast_env.site.zone import (
     NO_ZONE,
     BuildZone,
@@ -24,7 +23,7 @@ from blast_env.site.zone import (
     reason_against,
     reasons_against,
 )
-from blast_env.vehicles.access_way import closing_places, is_open
+from blast_env.vehicles.vehicle import closing_places, is_open
 
 if TYPE_CHECKING:  # most sites have no vehicle
     from blast_env.vehicles.worst_places import WorstPlaces

@@ -32,8 +32,7 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.blast_site import Charge
-from blast_env.site.structures import buildings_of
-from blast_env.site.terraces import ground_below_m, is_open_below, levels_of
+from blast_env.site.structures import buildings_of, ground_below_m, is_open_below, levels_of
 from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.drive import Impact
 from blast_env.vehicles.driving import WayPoint

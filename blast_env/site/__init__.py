@@ -25,9 +25,10 @@ if TYPE_CHECKING:
         StockBarrier,
         stock_barriers,
     )
-    from blast_env.site.content import SCHEMA_VERSION
-    from blast_env.site.files import (
+    from blast_env.site.content import SCHEMA_VERSION, highest_top_m
+    from blast_env.site.models import (
         AnyScenario,
+        Scenario,
         find_problems,
         find_scenario,
         load_scenario,
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
         save_scenario,
         scenario_hash,
     )
-    from blast_env.site.heights import highest_top_m
-    from blast_env.site.models import Scenario
     from blast_env.site.objective import (
         ConditionalValueAtRisk,
         MeanRisk,
@@ -53,18 +52,19 @@ if TYPE_CHECKING:
         with_overrides,
         with_resolution,
     )
-    from blast_env.site.presets import MassPreset, tnt_equivalent_kg
     from blast_env.site.sight import in_sight
     from blast_env.site.sources import (
         AnyCharge,
         AnySource,
         ChargeSource,
+        MassPreset,
         PointSource,
         RectangleSource,
         SegmentSource,
         VehicleCharge,
         VehicleSource,
         ranked,
+        tnt_equivalent_kg,
     )
     from blast_env.site.structures import (
         AnyStructure,
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
         loaded_walls,
     )
     from blast_env.site.zone import BuildZone, CostArea, KeepOut, distance_m, source_bounds_m
-    from blast_env.vehicles.access_way import AccessWay
+    from blast_env.vehicles.vehicle import AccessWay
 else:
     __getattr__, __dir__ = on_first_use(__name__)
 

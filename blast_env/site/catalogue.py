@@ -23,7 +23,7 @@ from blast_env.geometry import Cell, Element, Measure, Piece, Removal
 from blast_env.problems import Problem, ScenarioError, unknown_name
 from blast_env.sections import FOR_PEOPLE, Count, HashMark, Height, Name, Section, SparseSection
 from blast_env.site.structures import FacadePart
-from blast_env.vehicles.crash_rating import CrashRating
+from blast_env.vehicles.vehicle import CrashRating
 
 Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]
 Mass = Annotated[StrictFloat, Field(ge=0.1, le=1e6)]

@@ -13,16 +13,19 @@ from blast_env.geometry import TOLERANCE_M, Rectangle
 from blast_env.problems import Problem, extent, unknown_name
 from blast_env.sections import MOST_MODULES, Area, GaugeSection
 from blast_env.site.blast_site import BARRIER_NAME
-from blast_env.site.content import Content, outside_site
+from blast_env.site.content import Content, highest_grounds_m, outside_site
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
-from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or_below
 from blast_env.site.parameters import for_charge
 from blast_env.site.sources import PlaceSource, VehicleSource
-from blast_env.site.structures import AnyStructure
-from blast_env.site.terraces import terrace_problems
+from blast_env.site.structures import (
+    AnyStructure,
+    depth_inside_m,
+    is_over_or_below,
+    terrace_problems,
+)
 from blast_env.site.zone import BuildZone, EmptyZone, distance_m, empty_zone, source_bounds_m
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.access_way import AccessWay, closing_places, is_open
+from blast_env.vehicles.vehicle import AccessWay, closing_places, is_open
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""

@@ -1,11 +1,13 @@
-"""The content of a scenario file: all its sections, without the checks between them."""
+"""The content of a scenario file: all its sections and heights, without the checks between them."""
 
 from collections.abc import Iterable, Iterator
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Annotated, Final
 
+import numpy as np
 from pydantic import AfterValidator, Field, StrictInt
 
+from blast_env.arrays import any_in_windows, counts_before
 from blast_env.geometry import Element, Rectangle, Wall
 from blast_env.problems import Problem, extent
 from blast_env.response.components import Component
@@ -18,16 +20,17 @@ from blast_env.sections import (
     Section,
     Site,
 )
-from blast_env.site.heights import default_air_height_m
+from blast_env.site.blast_site import WALLS
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.parameters import SimulationParameters, SimulationSection
 from blast_env.site.sources import AnySource, VehicleSource
-from blast_env.site.structures import AnyStructure, loaded_walls
-from blast_env.site.zone import BuildZone, Surroundings
-from blast_env.vehicles.crash_rating import CrashPiece, Obstacles
+from blast_env.site.structures import AnyStructure, ground_m, loaded_walls
+from blast_env.site.zone import BuildZone, Surroundings, usable_cells
+from blast_env.vehicles.vehicle import CrashPiece, Obstacles
 
 if TYPE_CHECKING:
     from blast_env.vehicles.drive import VehicleGround
+
 
 SCHEMA_VERSION: Final = 2
 """The version of the file format."""
@@ -48,6 +51,12 @@ def _check_version(version: int) -> int:
         raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
     return version
 
+
+LEAST_AIR_HEIGHT_M: Final = 12.0
+"""Least default height of the air."""
+
+AIR_ABOVE_M: Final = 6.0
+"""Air above the highest structure or barrier, so that the blast can pass over it."""
 
 _MOST_GROUNDS: Final = 64
 """Most grounds of vehicles that a scenario keeps: a charge of another mass is another vehicle."""
@@ -100,7 +109,35 @@ class Content(Section):
         """
         if self.site.air_height_m is not None:
             return self.site.air_height_m
-        return default_air_height_m(self.structures, self.build_zone)
+        return self.default_air_height_m
+
+    @property
+    def default_air_height_m(self) -> float:
+        """The height of the air of a site that gives none."""
+        tops_m = [structure.height_m or 0.0 for structure in self.structures]
+        zone = self.build_zone
+        barrier_m = None if zone is None else highest_top_m(zone, self.structures)
+        return max(LEAST_AIR_HEIGHT_M, max(*tops_m, barrier_m or 0.0) + AIR_ABOVE_M)
+
+    @property
+    def height_notes(self) -> tuple[str, ...]:
+        """The features of the scenario that an engine without heights ignores, in sentences."""
+        zone = self.build_zone
+        walls = any(structure.height_m is not None for structure in self.structures)
+        walls |= zone is not None and bool(zone.items or zone.height_m)
+        notes = []
+        if walls:
+            notes.append(
+                "The model has no heights: every structure and module counts as endlessly high, so"
+                " that nothing goes over it and barriers seem to protect more than they do."
+            )
+        if any(source.height_m > 0.0 for source in self.charge):
+            notes.append("The model has no heights: the charge counts as if it lay on the ground.")
+        if any(structure.faces != WALLS for structure in self.structures):
+            notes.append("The load on all walls counts, not only on those that the scenario names.")
+        if self.gauges:
+            notes.append("The model has no air pressure: the scenario's gauges record nothing.")
+        return tuple(notes)
 
     def surroundings(self, zone: BuildZone) -> Surroundings:
         """Return a build zone with all that decides its usable cells."""
@@ -188,3 +225,44 @@ def outside_site(
     if not scenario.site.rectangle_m.contains(rectangle):
         site = extent(scenario.site.rectangle_m)
         yield Problem(key, f"{description} must lie inside the site ({site})")
+
+
+def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
+    """Return the largest height of a barrier's top, m; `None` is the height of the air.
+
+    It is the largest sum of an item's height and the highest ground on which it can stand.
+    """
+    grounds_m = highest_grounds_m(zone, structures)
+    if not zone.items:
+        return None if zone.height_m is None else zone.height_m + grounds_m[0]
+    return max(item.height_m + ground for item, ground in zip(zone.items, grounds_m, strict=True))
+
+
+def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tuple[float, ...]:
+    """Return the highest ground on which each item, or a single module, can stand, m.
+
+    Charges and vehicles are ignored. An item that fits nowhere has 0.
+    """
+    structures = tuple(structures)
+    zone_m = zone.rectangle_m
+    has_terrace = any(
+        box.overlaps(zone_m)
+        for structure in structures
+        if structure.carries
+        for box in structure.boxes_m
+    )
+    return _grounds_m(zone, structures) if has_terrace else (0.0,) * max(len(zone.items), 1)
+
+
+@lru_cache(maxsize=16)
+def _grounds_m(zone: BuildZone, structures: tuple[AnyStructure, ...]) -> tuple[float, ...]:
+    free = usable_cells(Surroundings(zone, structures, (), 0.0, None))
+    ground = ground_m(structures, zone.boxes)
+    variants = [variant for variant in zone.catalogue.variants if not variant.is_measure]
+    found = [0.0] * max(len(zone.items), 1)
+    for height_m in np.unique(ground[free]).tolist():  # the lowest first
+        taken = counts_before(~free | (ground != height_m))
+        for variant in variants:
+            if not any_in_windows(taken, variant.rows, variant.columns).all():
+                found[variant.item] = height_m
+    return tuple(found)

@@ -1,12 +1,24 @@
-"""The structures of a scenario, and their facades."""
+"""The structures of a scenario, their facades, and the terraces that carry others."""
 
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
+import numpy as np
 from pydantic import AfterValidator, Field, StrictBool, StrictFloat, StrictInt, model_validator
 
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.bays import BAY_M, STOREY_M, Bay
-from blast_env.geometry import Cell, Rectangle, Wall, WallName
+from blast_env.geometry import (
+    TOLERANCE_M,
+    Boxes,
+    Cell,
+    Rectangle,
+    Wall,
+    WallName,
+    covered_m2,
+    overlapping,
+    stacked_runs,
+)
 from blast_env.problems import Problem, ScenarioError
 from blast_env.response.components import PaneSide
 from blast_env.sections import (
@@ -353,3 +365,105 @@ def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStruct
     for structure in structures:
         buildings.setdefault(structure.building_name, []).append(structure)
     return buildings
+
+
+def terrace_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:
+    """Yield the problems of terraces, each of which must be solid and have a height."""
+    for index, structure in enumerate(structures):
+        if structure.carries and structure.height_m is None:
+            message = "is true, needs the structure's height_m: barriers stand on its top"
+            yield Problem(f"structures[{index}].carries", message)
+        if structure.carries and structure.base_m > 0.0:
+            message = f"is {structure.base_m:g}, must be 0: a terrace is solid"
+            yield Problem(f"structures[{index}].base_m", message)
+
+
+def ground_m(structures: Iterable[AnyStructure], boxes: Boxes) -> FloatArray:
+    """Return the height of the ground below squares, m: the highest terrace that each overlaps."""
+    return _highest(_terraces(structures), boxes)
+
+
+def _highest(terraces: Iterable[tuple[Rectangle, float]], boxes: Boxes) -> FloatArray:
+    ground = np.zeros(np.broadcast_shapes(*(side.shape for side in boxes)))
+    for terrace_m, height_m in terraces:
+        own = overlapping(terrace_m, boxes)
+        ground[own] = np.maximum(ground[own], height_m)
+    return ground
+
+
+def ground_below_m(structures: Iterable[AnyStructure], rectangle_m: Rectangle) -> float:
+    """Return the height of the ground below one rectangle, m; 0 beside all terraces."""
+    own_m = (high_m for plan_m, high_m in _terraces(structures) if plan_m.overlaps(rectangle_m))
+    return max(own_m, default=0.0)
+
+
+def levels_of(
+    structures: Iterable[AnyStructure], rectangle_m: Rectangle
+) -> dict[float, list[Rectangle]]:
+    """Return the parts of a rectangle by the height of the ground below them, m."""
+    terraces = [terrace for terrace in _terraces(structures) if terrace[0].overlaps(rectangle_m)]
+    left, bottom, right, top = rectangle_m
+    plans = [item for item, _ in terraces]
+    xs = sorted({left, right, *(x for plan in plans for x in plan[::2] if left < x < right)})
+    ys = sorted({bottom, top, *(y for plan in plans for y in plan[1::2] if bottom < y < top)})
+    across, up = np.array(xs)[np.newaxis], np.array(ys)[:, np.newaxis]
+    ground = _highest(terraces, (across[:, :-1], up[:-1], across[:, 1:], up[1:]))
+    return {
+        float(height_m): [
+            Rectangle(xs[column], ys[row], xs[column + columns], ys[row + rows])
+            for row, column, rows, columns in stacked_runs(ground == height_m).tolist()
+        ]
+        for height_m in np.unique(ground)
+    }
+
+
+def lie_wholly_on(
+    structures: Iterable[AnyStructure], height_m: float | None, boxes: Boxes
+) -> BoolArray:
+    """Return whether terraces of one height cover each square without a gap."""
+    left, bottom, right, top = boxes
+    open_m2 = (right - left) * (top - bottom)
+    for terrace_m, top_m in _terraces(structures):
+        if top_m == height_m:
+            open_m2 = open_m2 - covered_m2(terrace_m, boxes)
+    whole: BoolArray = open_m2 <= TOLERANCE_M
+    return whole
+
+
+def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -> bool:
+    """Return whether there is air below a structure: it is not on the ground or on a terrace."""
+    if structure.base_m == 0.0:
+        return False
+    left, bottom, right, top = np.array(structure.boxes_m).T
+    return not lie_wholly_on(structures, structure.base_m, (left, bottom, right, top)).all()
+
+
+def _terraces(structures: Iterable[AnyStructure]) -> Iterator[tuple[Rectangle, float]]:
+    """Yield plan and height of each terrace."""
+    for structure in structures:
+        if structure.carries and structure.height_m is not None:
+            yield from ((box, structure.height_m) for box in structure.boxes_m)
+
+
+def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:
+    """Return whether a height is above a structure's roof, if it has one, or below its base."""
+    is_over = structure.height_m is not None and height_m > structure.height_m
+    return is_over or height_m < structure.base_m
+
+
+def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
+    """Return the depth of a point inside a structure, m: its distance to the nearest surface.
+
+    It is negative or 0 outside. The ground is no surface.
+    """
+    x_m, y_m, z_m = position_m
+    depth_m = max(
+        min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+        for left, bottom, right, top in structure.boxes_m
+    )
+    if structure.footprint is not None and depth_m > 0.0:  # boxes of a polygon share sides
+        place_m = np.array([(x_m, y_m)])
+        depth_m = min(float(wall.distances_m(place_m)[0]) for wall in structure.footprint.walls)
+    if structure.base_m > 0.0:
+        depth_m = min(depth_m, z_m - structure.base_m)
+    return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)

@@ -12,11 +12,10 @@ from blast_env.sections import Ground, PointM, Site
 from blast_env.site.content import Content, outside_site
 from blast_env.site.sources import VehicleSource
 from blast_env.site.zone import BuildZone, EmptyZone, empty_zone
-from blast_env.vehicles.crash_rating import Obstacles
 from blast_env.vehicles.drive import VehicleGround
 from blast_env.vehicles.driving import places_shape
 from blast_env.vehicles.reach import places_on
-from blast_env.vehicles.vehicle import Vehicle
+from blast_env.vehicles.vehicle import Obstacles, Vehicle
 
 MOST_PLACES: Final = 3_000_000
 """Most places of the charges of all vehicles: three vehicles on the largest site."""

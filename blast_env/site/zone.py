@@ -46,10 +46,9 @@ from blast_env.site.catalogue import (
     Variant,
 )
 from blast_env.site.sources import AnySource, PointSource, RectangleSource, VehicleSource
-from blast_env.site.structures import AnyStructure
-from blast_env.site.terraces import ground_m, lie_wholly_on
+from blast_env.site.structures import AnyStructure, ground_m, lie_wholly_on
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.access_way import AccessWay
+from blast_env.vehicles.vehicle import AccessWay
 
 BUDGET_TOLERANCE: Final = 1e-9
 """Share of the budget by which rounding may exceed it."""

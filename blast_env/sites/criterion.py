@@ -25,7 +25,7 @@ from blast_env.site import (
     Scenario,
     find_scenario,
 )
-from blast_env.site.terraces import is_open_below
+from blast_env.site.structures import is_open_below
 from blast_env.sites.sight_bits import SightBits, Words, take_next
 from blast_env.units import MODULE_SIDE_M
 

@@ -15,7 +15,7 @@ from blast_env.site import Problem, ScenarioError
 from blast_env.site.parameters import PresetName
 from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.access_way import WholeModules
+from blast_env.vehicles.vehicle import WholeModules
 
 Span = tuple[float, float]
 """Lowest and highest value, both possible."""

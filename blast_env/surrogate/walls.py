@@ -17,7 +17,7 @@ from blast_env.response.levels import BayDamage
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.facade import BayComponents
-from blast_env.site.terraces import ground_below_m, is_open_below
+from blast_env.site.structures import ground_below_m, is_open_below
 from blast_env.surrogate.approach import Approach, curves
 from blast_env.surrogate.loads import SiteArrays
 from blast_env.surrogate.neighbours import piece_traits

@@ -6,12 +6,22 @@ from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
     from blast_env.geometry import Wall
-    from blast_env.vehicles.access_way import AccessWay, closing_places, is_open
-    from blast_env.vehicles.crash_rating import NOTHING, CrashPiece, CrashRating, Obstacles
     from blast_env.vehicles.drive import Drive, Impact, VehicleGround
     from blast_env.vehicles.driving import KM_H_PER_M_S, STEP_M, SpeedField
     from blast_env.vehicles.reach import Reach
-    from blast_env.vehicles.vehicle import Entry, Motion, SlowArea, Vehicle
+    from blast_env.vehicles.vehicle import (
+        NOTHING,
+        AccessWay,
+        CrashPiece,
+        CrashRating,
+        Entry,
+        Motion,
+        Obstacles,
+        SlowArea,
+        Vehicle,
+        closing_places,
+        is_open,
+    )
     from blast_env.vehicles.worst_places import WorstPlaces, nearest_point_m, stand_off_m
 else:
     __getattr__, __dir__ = on_first_use(__name__)

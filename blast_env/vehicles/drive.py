@@ -25,10 +25,9 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle, Wall, WallName, stacked_runs
 from blast_env.sections import PointM, Site
 from blast_env.units import MODULE_SIDE_M
-from blast_env.vehicles.crash_rating import NOTHING, CrashPiece, Obstacles
 from blast_env.vehicles.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
 from blast_env.vehicles.reach import Reach, ReachQuery, steps_of
-from blast_env.vehicles.vehicle import Entry, Vehicle
+from blast_env.vehicles.vehicle import NOTHING, CrashPiece, Entry, Obstacles, Vehicle
 from blast_env.vehicles.worst_places import PlainGround, WorstPlaces, least_distances_m, worst_of
 
 _SAME_M: Final = 1e-9

@@ -8,8 +8,8 @@ from numba import njit
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
-from blast_env.vehicles.crash_rating import OTHER, SOLID, STOPS
 from blast_env.vehicles.reach_kernels import reached_parts, with_edges
+from blast_env.vehicles.vehicle import OTHER, SOLID, STOPS
 
 _NEAR: Final = 1e-9
 """Relative error far above that of a squared distance: nearer to a bound, `hypot` decides."""

@@ -15,7 +15,7 @@ from blast_env.geometry import Layout
 from blast_env.response.levels import LevelOfProtection
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
-from blast_env.site.presets import CHARGE_PRESETS, PRESETS_SOURCE, MassPreset
+from blast_env.site.sources import CHARGE_PRESETS, PRESETS_SOURCE, MassPreset
 
 _REQUIREMENTS: Final = (
     *("very low", "low", "medium", "high"),
