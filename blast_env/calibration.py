@@ -1,28 +1,26 @@
 """Calibration of the particle model, and the reference curves: the public names."""
 
 from blast_env.curves import Friedlander, kingery_bulmash, scaled_distance
-from blast_env.particles.calibration.agreement import (
+from blast_env.particles.calibration.fits import (
+    FewDistancesWarning,
     FitMetrics,
     LeaveOneOut,
     bootstrap_coefficients,
-    fit_metrics,
-    leave_one_out,
-    shape_rms_percent,
-)
-from blast_env.particles.calibration.laws import (
-    FewDistancesWarning,
-    LinearLaw,
-    PowerLaw,
-    ProportionalLaw,
-    ScalingLaw,
     fit_linear,
+    fit_metrics,
     fit_power_law,
     fit_proportional,
+    leave_one_out,
+    shape_rms_percent,
 )
 from blast_env.particles.calibration.load_unit import LoadCalibration, LoadUnit
 from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
+    LinearLaw,
+    PowerLaw,
+    ProportionalLaw,
+    ScalingLaw,
     load_calibration,
     save_calibration,
     stored_calibrations,

@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Collection, Mapping
 from enum import Enum
+from functools import cached_property
 from hashlib import sha256
 from math import ceil
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
@@ -159,12 +160,12 @@ class Site(Section):
     height_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
     air_height_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)] | None = None
 
-    @property
+    @cached_property
     def rectangle_m(self) -> Rectangle:
         """The whole site."""
         return Rectangle(0.0, 0.0, self.width_m, self.height_m)
 
-    @property
+    @cached_property
     def squares(self) -> tuple[int, int]:
         """Number of rows and of columns of squares of 0.5 m that cover the site."""
         return ceil(self.height_m / MODULE_SIDE_M - 1e-9), ceil(self.width_m / MODULE_SIDE_M - 1e-9)

@@ -11,11 +11,6 @@ UNITS_PER_M: Final = 4.0
 """Simulation units in one metre (equation 4)."""
 
 
-def in_units(place_m: tuple[float, float]) -> tuple[float, float]:
-    """Return a place in metres in simulation units."""
-    return place_m[0] * UNITS_PER_M, place_m[1] * UNITS_PER_M
-
-
 MODULE_SIDE_UNITS: Final = 2.0
 """Side of a square `ModularPart` (section 2.7)."""
 

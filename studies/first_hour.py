@@ -30,7 +30,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import Reward
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.evaluation.engines import Engine, find_engine
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.evaluator import BlastStore
 from blast_env.layout import charge_against
 from blast_env.plots.figures import save_figure
 from blast_env.site import AnyCharge, Charge, Scenario, VehicleCharge, VehicleSource

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from blast_env.answers.document import Line
-from blast_env.particles.calibration.agreement import shape_rms_percent
+from blast_env.particles.calibration.fits import shape_rms_percent
 from blast_env.particles.calibration.model import Calibration
 from blast_env.particles.calibration.paper_table import paper_table
 

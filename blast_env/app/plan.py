@@ -14,7 +14,7 @@ from blast_env.app.editor import Ghost
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.layout import LayoutState
-from blast_env.particles.structure import Colour
+from blast_env.particles.objects import Colour
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
     FAINT,

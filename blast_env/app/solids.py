@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from blast_env.geometry import Layout, Rectangle
-from blast_env.particles.structure import Colour
+from blast_env.particles.objects import Colour
 from blast_env.plots.plan import (
     EXPLOSIVE,
     STANDING,

@@ -14,8 +14,12 @@ from blast_env.cli.output import print_outcome, progress_bar, resumable, save_pi
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, PAPER_ENGINES, find_engine
 from blast_env.files import make_folder
-from blast_env.particles.calibration.laws import LawName
-from blast_env.particles.calibration.model import Calibration, SimulatedQuantity, save_calibration
+from blast_env.particles.calibration.model import (
+    Calibration,
+    LawName,
+    SimulatedQuantity,
+    save_calibration,
+)
 from blast_env.site import Scenario, load_scenario
 from blast_env.tables import write_csv
 from blast_env.values import plain_number

@@ -34,7 +34,7 @@ from blast_env.envs.strategies import (
 )
 from blast_env.errors import value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.evaluator import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import AnyScenario

@@ -33,8 +33,13 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import Assessment, BlastCounts, BlastEvaluator, loads_together
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.evaluator import (
+    Assessment,
+    BlastCounts,
+    BlastEvaluator,
+    BlastStore,
+    loads_together,
+)
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.batch import LayoutBatch, PlacementRules
@@ -163,9 +168,9 @@ class _Site:
         empty: The site without a barrier.
         rules: The rules of placing on it.
         actions: The numbered actions.
+        nothing: The information on the blasts before the end, without the charges.
         shown: What an agent is shown, by the charges.
         bare: The loads without a barrier, by the threats.
-        outcomes: The information before the end, by the number of charges.
         observed: What the observation keeps for all of them.
     """
 
@@ -173,9 +178,9 @@ class _Site:
     empty: LayoutState
     rules: PlacementRules
     actions: NumberedActions
+    nothing: Mapping[str, Any]
     shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
-    outcomes: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     observed: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -188,19 +193,14 @@ class _Site:
         """
         check_size(scenario, task.source.representative)
         empty = LayoutState.empty(scenario)
+        evaluator = BlastEvaluator(scenario, task.engine, cache=task.store, counts=task.counts)
         return cls(
-            BlastEvaluator(scenario, task.engine, cache=task.store, counts=task.counts),
+            evaluator,
             empty,
             PlacementRules.of(empty),
             task.actions.numbered(scenario, task.source.representative),
+            _outcome(evaluator, _NOTHING, _NOTHING, ()),
         )
-
-    def no_outcome(self, charges: int) -> Mapping[str, Any]:
-        """Return the information on the blasts before the end of an episode."""
-        if charges not in self.outcomes:
-            nothing = (_NOTHING, _NOTHING, (_NO_CHARGE,) * charges)
-            self.outcomes[charges] = _outcome(self.evaluator, *nothing)
-        return self.outcomes[charges]
 
     def shown_of(self, task: Task, charges: tuple[AnyCharge, ...]) -> _Shown:
         """Return what is shown of an episode with some charges."""
@@ -284,7 +284,8 @@ class Episode:
     def outcome(self) -> Mapping[str, Any]:
         """The information on the blasts; before the end, loads and counts are 0."""
         if self.final is None:
-            return self.site.no_outcome(len(self.shown.charges))
+            no_charges = (_NO_CHARGE,) * len(self.shown.charges)
+            return {**self.site.nothing, "charges": no_charges}
         charges = self.case.charges_against(self.final)
         return _outcome(self.site.evaluator, *self.assess(), charges)
 

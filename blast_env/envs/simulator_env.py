@@ -21,7 +21,7 @@ from blast_env.evaluation.engines import PAPER_ENGINES, Blast, BlastResult, Engi
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState, check_layout
 from blast_env.layout.build_site import draw_threat
-from blast_env.particles.balls import CollisionType
+from blast_env.particles.objects import CollisionType
 from blast_env.particles.run import BlastRun
 from blast_env.results import EndReason
 from blast_env.site import AnyScenario, Scenario, find_scenario

@@ -16,7 +16,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.episode import Episode, Episodes
 from blast_env.envs.observable import one_of
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.evaluator import BlastStore
 from blast_env.values import whole_number
 
 _LOADS_EACH: Final = 16

@@ -7,12 +7,17 @@ from blast_env.lazy import on_first_use
 if TYPE_CHECKING:
     from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
     from blast_env.evaluation.evaluate import compare, evaluate_layout
-    from blast_env.evaluation.evaluator import Assessment, BlastCounts, BlastEvaluator, Evaluators
+    from blast_env.evaluation.evaluator import (
+        Assessment,
+        BlastCounts,
+        BlastEvaluator,
+        BlastStore,
+        Evaluators,
+    )
     from blast_env.evaluation.problem import BudgetError, DesignProblem
     from blast_env.evaluation.questions.grid_error import GridError, convergence_index
     from blast_env.evaluation.questions.reduction import Evaluation, ThreatOutcome
     from blast_env.evaluation.record import BlastKey, BlastLoads, StructureLoad
-    from blast_env.evaluation.store import BlastStore
     from blast_env.statistics import (
         CVAR_LEVEL,
         Estimate,

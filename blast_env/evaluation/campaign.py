@@ -9,9 +9,8 @@ from typing import Final
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct
 from blast_env.evaluation.engines.contract import BlastDrawing, Engine
-from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.evaluator import BlastEvaluator, BlastStore
 from blast_env.evaluation.record import BlastRecord
-from blast_env.evaluation.store import BlastStore
 from blast_env.gas.cost import CostGuess
 from blast_env.geometry import Layout
 from blast_env.layout.placement import load_relevant

@@ -13,9 +13,8 @@ from blast_env.evaluation.campaign import Campaign, blasts_of
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, draw_threats, in_turn
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.engines.contract import final_engine
-from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.evaluator import BlastEvaluator, BlastStore, Evaluators
 from blast_env.evaluation.questions.reduction import Evaluation
-from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.site import AnyScenario, find_scenario

@@ -1,31 +1,181 @@
-"""Loads of layouts under threats, with each blast simulated once and kept."""
+"""Loads of layouts under threats: each blast is simulated once, and kept in a store."""
 
 import dataclasses
+import json
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
 from math import nan
 from operator import attrgetter
 from pathlib import Path
-from typing import Final, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Self, TypeVar
 
+from blast_env.errors import BlastEnvError, BlastEnvWarning, value_text
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.evaluation.engines.contract import BlastDrawing, EngineBlast
-from blast_env.evaluation.record import BlastKey, BlastLoads, BlastRecord, parts_digest
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.record import KEY, BlastKey, BlastLoads, BlastRecord, parts_digest
 from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.layout.placement import LegalLayout, load_relevant
-from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
 from blast_env.site import AnyScenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.units import PA_PER_PSI
+
+if TYPE_CHECKING:
+    from blast_env.store import Store
+
+
+MOST_BYTES: Final = 256_000_000
+"""Default maximum size of the file of a store; a blast in the courtyard takes 2 kB."""
+
+_FILE: Final = "blasts.sqlite"
+_MOST_COMPLETE: Final = 256  # in memory, without a file; one with histories takes up to a megabyte
+
+
+class BlastStore:
+    """The records of blasts: the most recently used in memory and, with a folder, all in a file.
+
+    The file serves other processes and later runs; see `Store`. If it becomes unusable, a warning
+    is issued and the work continues without it. A store can be pickled, with what is in memory.
+    With a file, loads alone stay in memory.
+
+    Args:
+        folder: Folder of the file; created if necessary. Without one, records are only in memory.
+        size: Maximum number of loads in memory; 0 for none. Each takes 8 bytes per module plus
+            about a kilobyte.
+        most_bytes: Maximum total size of the records in the file.
+
+    Raises:
+        BlastEnvError: If a bound is negative, or the file is damaged or cannot be made.
+    """
+
+    def __init__(
+        self, folder: str | Path | None = None, size: int = 4096, most_bytes: int = MOST_BYTES
+    ) -> None:
+        if size < 0:
+            raise BlastEnvError(f"cache_size is {size}, must be at least 0")
+        self.size = size
+        self._loads: OrderedDict[BlastKey, BlastLoads] = OrderedDict()
+        self._complete: OrderedDict[BlastKey, BlastRecord] = OrderedDict()
+        self._file = None if folder is None else _opened(Path(folder) / _FILE, most_bytes)
+
+    @classmethod
+    def of(cls, value: "str | Path | BlastStore | None", size: int = 4096) -> "BlastStore":
+        """Return the store for an argument `cache`: a folder, a store, or `None`."""
+        if isinstance(value, BlastStore):
+            return value
+        if value is not None and not isinstance(value, str | Path):
+            raise BlastEnvError(f"cache is {value_text(value)}, must be a folder or a BlastStore")
+        return cls(value, size)
+
+    @property
+    def damaged(self) -> int:
+        """Number of damaged blasts found in the file by this object."""
+        return 0 if self._file is None else self._file.damaged
+
+    def get(self, key: BlastKey, scenario: AnyScenario | None = None) -> BlastLoads | None:
+        """Return the loads of a blast, or `None` if they are missing or damaged.
+
+        Loads in the file that cannot be those of `scenario` count as missing: anybody may write to
+        it.
+        """
+        # 1. In memory; 2. in the file; 3. what was found there stays in memory.
+        loads = self._loads.get(key)
+        if loads is not None:
+            with suppress(KeyError):  # another thread has displaced it
+                self._loads.move_to_end(key)
+            return loads
+        found = self._read(key, scenario)
+        if found is None:
+            return None
+        self.remember(key, found.loads)
+        return found.loads
+
+    def record(self, key: BlastKey, scenario: AnyScenario | None = None) -> BlastRecord | None:
+        """Return the complete record of a blast; `None` if it is missing, damaged, or loads alone.
+
+        As for `get`, it must be able to be that of `scenario`.
+        """
+        found = self._complete.get(key) or self._read(key, scenario)
+        return None if found is None or found.details is None else found
+
+    def add(self, key: BlastKey, loads: BlastLoads) -> None:
+        """Keep the loads of a blast, which may displace others."""
+        if self._file is None:
+            self.remember(key, loads)
+        else:
+            self.keep(key, BlastRecord(loads))
+
+    def keep(self, key: BlastKey, record: BlastRecord) -> None:
+        """Keep the record of a blast, which may displace others."""
+        self.remember(key, record.loads)
+        if self._file is None:
+            if record.details is not None and self.size:
+                self._complete[key] = record
+                if len(self._complete) > _MOST_COMPLETE:
+                    self._complete.popitem(last=False)
+            return
+        try:
+            self._file.put(key.text, record.encoded())
+        except BlastEnvError as error:
+            warnings.warn(f"a blast is not kept: {error}", BlastEnvWarning, stacklevel=3)
+
+    def remember(self, key: BlastKey, loads: BlastLoads) -> None:
+        """Keep the loads of a blast in memory only."""
+        for on_modules in (loads.module_impulse_n_s, loads.module_impulse_sim):
+            on_modules.flags.writeable = False  # shared by several callers
+        self._loads.pop(key, None)
+        self._loads[key] = loads
+        with suppress(KeyError):  # another thread has displaced it
+            if len(self._loads) > self.size:
+                self._loads.popitem(last=False)
+
+    def _read(self, key: BlastKey, scenario: AnyScenario | None) -> BlastRecord | None:
+        """Return a record of the file."""
+        if self._file is None:
+            return None
+        try:
+            found = self._file.read(key.text, BlastRecord.decoded)
+        except BlastEnvError as error:
+            warnings.warn(f"a blast counts as missing: {error}", BlastEnvWarning, stacklevel=3)
+            return None
+        # A file can hold anything: loads must have the structures and modules of the site.
+        is_known = found is not None and (
+            scenario is None or found.loads.are_for(find_scenario(scenario))
+        )
+        return found if is_known else None
+
+    def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
+        """Yield the loads of all undamaged blasts of the file, always in the same order.
+
+        Without a file, those in memory.
+
+        Raises:
+            BlastEnvError: If the file cannot be read.
+        """
+        if self._file is None:
+            yield from self._loads.items()
+            return
+        for text, content in self._file.items():
+            with suppress(ValueError):
+                yield KEY.validate_python(json.loads(text)), BlastRecord.decoded(content).loads
+
+    def __len__(self) -> int:
+        return len(self._loads) if self._file is None else len(self._file)
+
+
+def _opened(path: Path, most_bytes: int) -> "Store":
+    from blast_env.store import Store  # only where blasts go to a file
+
+    return Store(path, most_bytes)
 
 
 @dataclass
@@ -67,6 +217,7 @@ class BlastEvaluator:
     Attributes:
         calibration: The scenario's calibration, checked against its parameters and the engine;
             `None` for engines without particles, which need none.
+        calibration_name: Its name; `"none"` without one.
         store: Where the loads are.
 
     Raises:
@@ -85,7 +236,8 @@ class BlastEvaluator:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
         self.engine.check(self.scenario)
-        self.calibration: Calibration | None = self.engine.calibration(self.scenario)
+        law = self.calibration = self.engine.calibration(self.scenario)
+        self.calibration_name = "none" if law is None else law.name
         self.counts = BlastCounts() if counts is None else counts
         self.store = BlastStore.of(cache, cache_size)
         self._key_of_nothing = BlastKey(
@@ -94,15 +246,10 @@ class BlastEvaluator:
             charge=Charge((0.0, 0.0), 0.0),
             seed=0,
             engine=engine_text(self.engine),
-            calibration="" if self.calibration is None else self.calibration.digest,
+            calibration="" if law is None else law.digest,
             code=code_version(),
             parts=parts_digest(self.scenario),
         )
-
-    @property
-    def calibration_name(self) -> str:
-        """Name of the calibration; `"none"` for engines without particles, which need none."""
-        return "none" if self.calibration is None else self.calibration.name
 
     def coarser(self) -> "BlastEvaluator | None":
         """Return an evaluator with `Engine.coarser` and the same store, if there is one."""
@@ -134,6 +281,7 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
+        check_workers("processes", processes)
         asked = [(self, layout, threat) for layout, threat in pairs]
         return loads_together(asked, processes, progress)
 
@@ -212,7 +360,6 @@ def loads_together(
 
     Arguments and errors are those of `BlastEvaluator.loads_of_many`.
     """
-    check_workers("processes", processes)
     run = partial(_loads, processes=processes)
     found = _together(asked, BlastStore.get, run, BlastStore.add, progress)
     return [
@@ -281,6 +428,9 @@ def _loads(
     """Run blasts; yield (index, loads) when done."""
     # Lots as large as the engine takes less time for than for their parts.
     firsts = range(0, len(blasts), engine.at_once)
+    if len(firsts) == 1:  # as of an episode: nothing to share out
+        yield from enumerate(engine.loads_at_once(blasts))
+        return
     lots = [blasts[first : first + engine.at_once] for first in firsts]
     for lot, of_lot in as_completed(engine.loads_at_once, lots, processes):
         yield from enumerate(of_lot, start=firsts[lot])

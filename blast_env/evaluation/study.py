@@ -20,7 +20,7 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.contract import BlastDrawing
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.evaluator import BlastEvaluator, BlastStore
 from blast_env.evaluation.places import chief_threats, other_places, requested_threats
 from blast_env.evaluation.questions.grid_error import Effect, GridError, impulse_of
 from blast_env.evaluation.questions.limits import Limit, LoadLimit, SiteVerdict, check_limits
@@ -28,7 +28,6 @@ from blast_env.evaluation.questions.probability import Uncertainty
 from blast_env.evaluation.questions.reduction import ThreatOutcome
 from blast_env.evaluation.questions.verdict import Consequences, consequences_by_layout
 from blast_env.evaluation.record import BlastRecord
-from blast_env.evaluation.store import BlastStore
 from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, standing

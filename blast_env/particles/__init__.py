@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
-    from blast_env.particles.balls import Balls, CollisionType, air_lattice, explosion_fan
+    from blast_env.particles.objects import (
+        Balls,
+        CollisionType,
+        ModularObstacle,
+        air_lattice,
+        explosion_fan,
+        load_colour,
+        obstacle_of,
+    )
     from blast_env.particles.paper import (
         LINEAR,
         PAPER_LAWS,
@@ -22,10 +30,10 @@ if TYPE_CHECKING:
         BallStates,
         BlastRun,
         CollisionArray,
+        Scene,
+        build_scene,
         incidence_angle_rad,
     )
-    from blast_env.particles.scene import Scene, build_scene
-    from blast_env.particles.structure import ModularObstacle, load_colour, obstacle_of
     from blast_env.particles.tables import (
         COLLISION_COLUMNS,
         MODULE_COLUMNS,

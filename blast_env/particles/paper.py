@@ -7,16 +7,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from blast_env.particles.calibration.agreement import fit_metrics
-from blast_env.particles.calibration.laws import (
+from blast_env.particles.calibration.fits import (
     Fit,
+    fit_linear,
+    fit_metrics,
+    fit_power_law,
+    fit_proportional,
+)
+from blast_env.particles.calibration.model import (
     LinearLaw,
     PowerLaw,
     ProportionalLaw,
     ScalingLaw,
-    fit_linear,
-    fit_power_law,
-    fit_proportional,
 )
 from blast_env.particles.calibration.paper_table import paper_table
 

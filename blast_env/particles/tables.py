@@ -7,10 +7,9 @@ import numpy as np
 import pandas as pd
 
 from blast_env.arrays import FloatArray
-from blast_env.particles.balls import CollisionType
 from blast_env.particles.calibration.load_unit import LoadUnit
+from blast_env.particles.objects import CollisionType, ModularObstacle
 from blast_env.particles.run import CollisionArray, incidence_angle_rad
-from blast_env.particles.structure import ModularObstacle
 from blast_env.tables import OF_MODULES, Column, RunRecord, as_types, texts
 
 Columns = tuple[Column, ...]

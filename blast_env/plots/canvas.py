@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.particles.structure import Colour
+from blast_env.particles.objects import Colour
 from blast_env.plots.plan import BORDER, FAINT, INK, QUIET_INK, SITE
 from blast_env.plots.site_plan import add_bar, lay_out, trim_height, write_heading, write_legend
 from blast_env.plots.style import render_extra, unit_interval

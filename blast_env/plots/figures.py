@@ -9,7 +9,7 @@ import pandas as pd
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.files import write_atomically
-from blast_env.particles.structure import ModularObstacle
+from blast_env.particles.objects import ModularObstacle
 from blast_env.particles.tables import faces_hit
 from blast_env.plots.heat_map import heat_map
 from blast_env.plots.plan import QUIET_INK

@@ -7,10 +7,8 @@ import numpy as np
 
 from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import Blast
-from blast_env.particles.balls import CollisionType
-from blast_env.particles.run import BallStates
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import ModularObstacle
+from blast_env.particles.objects import CollisionType, ModularObstacle
+from blast_env.particles.run import BallStates, Scene
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.heat_map import LoadScale
 from blast_env.plots.plan import EXPLOSIVE, STANDING, Kinds, blast_features, without

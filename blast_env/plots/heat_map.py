@@ -9,7 +9,7 @@ from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.geometry import Rectangle
-from blast_env.particles.structure import ModularObstacle, ModularPart
+from blast_env.particles.objects import ModularObstacle, ModularPart
 from blast_env.plots.plan import INK, PROTECTED, STANDING, Feature, blast_features, without
 from blast_env.plots.site_plan import (
     add_bar,

@@ -20,7 +20,7 @@ import numpy as np
 from blast_env.arrays import BoolArray
 from blast_env.geometry import Element, Piece, Rectangle, Wall, stacked_runs, standing
 from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
-from blast_env.particles.structure import Colour
+from blast_env.particles.objects import Colour
 from blast_env.sections import PointM
 from blast_env.site import (
     AnySource,

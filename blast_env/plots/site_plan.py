@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from blast_env.geometry import Rectangle
-from blast_env.particles.structure import LoadColours, ModularObstacle
+from blast_env.particles.objects import LoadColours, ModularObstacle
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
     BARRIER,

@@ -11,9 +11,8 @@ import numpy as np
 from blast_env.errors import import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.geometry import Element, distance_to_rectangle, layout_counts
-from blast_env.particles.balls import CollisionType
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import Colour
+from blast_env.particles.objects import CollisionType, Colour
+from blast_env.particles.run import Scene
 from blast_env.site.blast_site import Charge
 from blast_env.units import MODULE_SIDE_M
 

@@ -1,6 +1,7 @@
 """The structures of a scenario, their facades, and the terraces that carry others."""
 
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
 import numpy as np
@@ -216,7 +217,7 @@ class ModularObstacleSection(StructureSection):
         """The footprint, as for every structure in rectangles of modules."""
         return (self.rectangle_m,)
 
-    @property
+    @cached_property
     def rectangle_m(self) -> Rectangle:
         """The footprint."""
         size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
@@ -250,7 +251,7 @@ class ConcreteSquareSection(StructureSection):
         """Columns of modules."""
         return self.side_modules
 
-    @property
+    @cached_property
     def rectangle_m(self) -> Rectangle:
         """The footprint."""
         side = self.side_modules * MODULE_SIDE_M

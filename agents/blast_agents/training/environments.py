@@ -18,7 +18,7 @@ from blast_env.envs.observable import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.store import BlastStore
+from blast_env.evaluation.evaluator import BlastStore
 from blast_env.processes import start_fork_server
 from blast_env.runner import configured_workers
 from blast_env.values import checked_seed, whole_number

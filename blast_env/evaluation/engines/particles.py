@@ -23,7 +23,8 @@ from blast_env.particles.calibration.model import (
     CalibrationError,
     scenario_calibration,
 )
-from blast_env.particles.start import VERSIONS, start_event, start_pymunk
+from blast_env.particles.event import VERSION as EVENT_VERSION
+from blast_env.particles.pymunk import VERSION as PYMUNK_VERSION
 from blast_env.provenance import versions
 from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
@@ -34,10 +35,9 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
 
     from blast_env.particles.calibration.load_unit import LoadUnit
     from blast_env.particles.event.engine import EventRun
+    from blast_env.particles.objects import ModularObstacle
     from blast_env.particles.pymunk.engine import PymunkRun
-    from blast_env.particles.run import BallStates, BlastRun, CollisionArray
-    from blast_env.particles.scene import Scene
-    from blast_env.particles.structure import ModularObstacle
+    from blast_env.particles.run import BallStates, BlastRun, CollisionArray, Scene
     from blast_env.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 200
@@ -105,11 +105,13 @@ class PymunkEngine(ParticleEngine):
     """Runs scenes on pymunk (Chipmunk): the reference of the paper's model."""
 
     name: str = "pymunk"
-    version: str = VERSIONS["pymunk"]
+    version: str = PYMUNK_VERSION
 
     def start(self, scene: "Scene") -> "PymunkRun":
         """Return a run of the scene in a new space."""
-        return start_pymunk(scene)
+        from blast_env.particles.pymunk.engine import PymunkRun  # loads a compiled library
+
+        return PymunkRun(scene)
 
 
 @dataclass(frozen=True)
@@ -123,12 +125,14 @@ class EventEngine(ParticleEngine):
     step_name: ClassVar[str] = "events"
 
     name: str = "event"
-    version: str = VERSIONS["event"]
+    version: str = EVENT_VERSION
     cell_units: float | None = None
 
     def start(self, scene: "Scene") -> "EventRun":
         """Return a run of the scene at time 0."""
-        return start_event(scene, self.cell_units)
+        from blast_env.particles.event.engine import EventRun  # Numba takes half a second to import
+
+        return EventRun(scene, self.cell_units)
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
@@ -155,7 +159,7 @@ class Blast(RunnableBlast):
     @cached_property
     def scene(self) -> "Scene":
         """The initial state."""
-        from blast_env.particles.scene import build_scene  # needed when the charge goes off
+        from blast_env.particles.run import build_scene  # needed when the charge goes off
 
         return build_scene(self.scenario, self.layout, self.seed, self.charge)
 

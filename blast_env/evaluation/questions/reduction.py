@@ -479,7 +479,7 @@ class Evaluation:
         barrier and without (for particles `impulse_sim`, the sum of m |v|; for gas `impulse_n_s`,
         the momentum on its walls), and its `reduction`.
         """
-        from blast_env.particles.structure import obstacle_of
+        from blast_env.particles.objects import obstacle_of
         from blast_env.particles.tables import module_table
 
         # Means over the threats, module by module, in the order of the scene.

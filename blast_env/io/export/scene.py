@@ -13,7 +13,7 @@ from blast_env.geometry import Layout, Rectangle
 from blast_env.io.export.bill import LayoutPlan
 from blast_env.io.export.gltf import Mesh, write_glb
 from blast_env.layout.build_site import barrier_outline, outlines
-from blast_env.particles.structure import Colour, LoadColours
+from blast_env.particles.objects import Colour, LoadColours
 from blast_env.plots.plan import BARRIER, EXPLOSIVE, FAINT, PROTECTED, STRUCTURE
 from blast_env.plots.style import nice_ceiling, unit_interval
 from blast_env.site import Scenario

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
+    from blast_env.particles.calibration.fits import Fit
     from blast_env.particles.calibration.free_field import (
         CalibrationReport,
         FreeFieldStudy,
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
         paper_reference,
         summarise,
     )
-    from blast_env.particles.calibration.laws import Fit
     from blast_env.particles.calibration.model import (
         CalibrationError,
         calibrated_engines,

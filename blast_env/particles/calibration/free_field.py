@@ -14,35 +14,36 @@ from scipy.special import stdtrit
 
 from blast_env.curves import kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.particles.calibration.agreement import (
+from blast_env.particles.calibration.fits import (
+    Fit,
     FitMetrics,
     bootstrap_coefficients,
-    fit_metrics,
-    leave_one_out,
-)
-from blast_env.particles.calibration.laws import (
-    Fit,
-    LawName,
-    ScalingLaw,
     fit_linear,
+    fit_metrics,
     fit_power_law,
     fit_proportional,
+    leave_one_out,
 )
 from blast_env.particles.calibration.model import (
     Calibration,
+    LawName,
     MetricsSection,
     ReferenceSection,
+    ScalingLaw,
     SimulatedQuantity,
 )
 from blast_env.particles.calibration.paper_table import paper_ufc_column
-from blast_env.particles.scene import build_scene
-from blast_env.particles.start import STARTS, VERSIONS
+from blast_env.particles.event import VERSION as EVENT_VERSION
+from blast_env.particles.pymunk import VERSION as PYMUNK_VERSION
+from blast_env.particles.run import BlastRun, Scene, build_scene
 from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.parameters import parameters_digest
 from blast_env.store import Store
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
+
+_VERSIONS: Final = MappingProxyType({"pymunk": PYMUNK_VERSION, "event": EVENT_VERSION})
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
 Amount = Annotated[float, Field(ge=0.0)]
@@ -103,8 +104,8 @@ class FreeFieldStudy:
                 raise BlastEnvError(
                     f"distances: {after:g} m follows {before:g} m, must be ascending, none twice"
                 )
-        if self.engine not in VERSIONS:
-            raise UnknownNameError("engine", self.engine, VERSIONS)
+        if self.engine not in _VERSIONS:
+            raise UnknownNameError("engine", self.engine, _VERSIONS)
         if not self.distances_m:
             raise BlastEnvError("distances: there are none, must be at least one")
         if not self.seeds or len(set(self.seeds)) < len(self.seeds):
@@ -132,7 +133,7 @@ class FreeFieldStudy:
         """
         # The key has all that a run depends on, so that no other one is taken for it.
         wanted = {
-            f"{scenario.content_hash} {seed} {self.engine} {VERSIONS[self.engine]}": (
+            f"{scenario.content_hash} {seed} {self.engine} {_VERSIONS[self.engine]}": (
                 scenario,
                 distance_m,
                 seed,
@@ -209,10 +210,21 @@ def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> p
     return table.reset_index()
 
 
+def _started(engine: str, scene: Scene) -> BlastRun:
+    """Return a run at time 0; only the engine in use is imported, as both load compiled code."""
+    if engine == "pymunk":
+        from blast_env.particles.pymunk.engine import PymunkRun
+
+        return PymunkRun(scene)
+    from blast_env.particles.event.engine import EventRun
+
+    return EventRun(scene)
+
+
 def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:
     """Run one blast, in a worker process."""
     key, scenario, distance_m, seed, engine = job
-    run = STARTS[engine](build_scene(scenario, (), seed))
+    run = _started(engine, build_scene(scenario, (), seed))
     while run.end_reason is None:
         run.advance(np.inf)
     (structure,) = run.obstacles
@@ -332,7 +344,7 @@ class CalibrationReport:
             preset=study.scenario.simulation.preset,
             parameters_digest=parameters_digest(study.scenario.parameters, study.engine),
             engine=study.engine,
-            engine_version=VERSIONS[study.engine],
+            engine_version=_VERSIONS[study.engine],
             blast_env_version=package_version(),
             facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
             ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,

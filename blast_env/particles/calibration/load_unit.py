@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from blast_env.particles.calibration.model import structure_width_m
-from blast_env.particles.structure import ModularObstacle
+from blast_env.particles.objects import ModularObstacle
 from blast_env.results import ScaledImpulse
 from blast_env.site.blast_site import Charge
 from blast_env.units import MODULE_SIDE_M

@@ -1,36 +1,182 @@
-"""Calibrations, from simulated impulse to impulse per area, stored with all their dependencies."""
+"""Laws from simulated to reference impulse (paper, section 3), and calibrations stored in files."""
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, dataclass, fields
 from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, overload
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word, value_text
 from blast_env.files import write_text
 from blast_env.geometry import Rectangle, distance_to_rectangle
-from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
 from blast_env.results import ScaledImpulse
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.parameters import SimulationParameters, parameters_digest
 from blast_env.units import PA_PER_PSI
-from blast_env.values import path_of
+from blast_env.values import Numbers, checked_array, first_bad, path_of
 
 if TYPE_CHECKING:  # a calibration is read long before there are balls and parts
-    from blast_env.particles.structure import ModularObstacle
+    from blast_env.particles.objects import ModularObstacle
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
 """The paper's sum of m |v|, or the momentum actually transferred along the normals."""
+
+LawName = Literal["proportional", "linear", "power"]
+"""The laws that `blast-env calibrate` fits."""
+
+
+@dataclass(frozen=True)
+class ScalingLaw(ABC):
+    """A law from simulated to reference impulse. Its fields are its coefficients."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not np.isfinite(value):
+                raise BlastEnvError(
+                    f"{type(self).__name__}: {name} is {value}, must be a finite number"
+                )
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """The coefficients by their names in the paper."""
+        return asdict(self)
+
+    @overload
+    def __call__(self, i_sim: float) -> float: ...
+
+    @overload
+    def __call__(self, i_sim: Numbers) -> FloatArray: ...
+
+    def __call__(self, i_sim: float | Numbers) -> float | FloatArray:
+        """Return the impulse in the unit of the reference, in the shape of `i_sim`.
+
+        Args:
+            i_sim: Impulses, simulation units.
+
+        Raises:
+            BlastEnvError: If an impulse is negative or not a finite number.
+        """
+        return _like_input(self._forward(checked_array("i_sim", i_sim, least=0.0)))
+
+    @overload
+    def inverse(self, i_reference: float) -> float: ...
+
+    @overload
+    def inverse(self, i_reference: Numbers) -> FloatArray: ...
+
+    def inverse(self, i_reference: float | Numbers) -> float | FloatArray:
+        """Return the simulated impulse that the law converts into `i_reference`.
+
+        Args:
+            i_reference: Impulses in the unit of the reference.
+
+        Raises:
+            BlastEnvError: If an impulse is not a finite number, if no simulated impulse of at
+                least 0 gives it, or if the law is a constant.
+        """
+        slope = list(self.coefficients)[-1]
+        if self.coefficients[slope] == 0.0:
+            raise BlastEnvError(f"{self} has no inverse: {slope} is 0, so it is a constant")
+        reference = checked_array("i_reference", i_reference)
+        with np.errstate(all="ignore"):  # values out of reach are rejected below
+            simulated = self._backward(reference)
+        out_of_reach = ~(np.isfinite(simulated) & (simulated >= 0.0))
+        if out_of_reach.any():
+            place, value = first_bad("i_reference", reference, out_of_reach)
+            raise BlastEnvError(
+                f"{place} is {value:g}, which {self} gives for no i_sim of at least 0"
+            )
+        return _like_input(simulated)
+
+    @abstractmethod
+    def _forward(self, i_sim: FloatArray) -> FloatArray:
+        """Apply the law to impulses that have been checked."""
+
+    @abstractmethod
+    def _backward(self, i_reference: FloatArray) -> FloatArray:
+        """Solve the law for i_sim; values out of reach give a negative number, infinity or NaN."""
+
+
+@dataclass(frozen=True)
+class ProportionalLaw(ScalingLaw):
+    """i_scaled = k i_sim (equation 5).
+
+    Attributes:
+        k: Unit of the reference per simulation unit.
+    """
+
+    k: float
+
+    def _forward(self, i_sim: FloatArray) -> FloatArray:
+        return self.k * i_sim
+
+    def _backward(self, i_reference: FloatArray) -> FloatArray:
+        return i_reference / self.k
+
+
+@dataclass(frozen=True)
+class LinearLaw(ScalingLaw):
+    """i_scaled = a + b i_sim (equation 7).
+
+    It is not clipped: with a negative `a`, a small impulse becomes negative, as in the paper.
+
+    Attributes:
+        a: Offset, unit of the reference.
+        b: Unit of the reference per simulation unit.
+    """
+
+    a: float
+    b: float
+
+    def _forward(self, i_sim: FloatArray) -> FloatArray:
+        return self.a + self.b * i_sim
+
+    def _backward(self, i_reference: FloatArray) -> FloatArray:
+        return (i_reference - self.a) / self.b
+
+
+@dataclass(frozen=True)
+class PowerLaw(ScalingLaw):
+    """i_scaled = A i_sim^B (section 3.3).
+
+    Attributes:
+        A: Impulse for i_sim = 1, unit of the reference, above 0.
+        B: Exponent, dimensionless.
+    """
+
+    A: float
+    B: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.A <= 0.0:
+            raise BlastEnvError(f"PowerLaw: A is {self.A}, must be above 0")
+
+    def _forward(self, i_sim: FloatArray) -> FloatArray:
+        if self.B < 0.0:
+            checked_array("i_sim", i_sim, above=0.0)
+        return self.A * i_sim**self.B
+
+    def _backward(self, i_reference: FloatArray) -> FloatArray:
+        solved: FloatArray = (i_reference / self.A) ** (1.0 / self.B)
+        return solved
+
+
+def _like_input(array: FloatArray) -> float | FloatArray:
+    return float(array) if array.ndim == 0 else array
+
 
 LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
     {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
@@ -106,7 +252,7 @@ class Calibration(CalibrationSection):
 
     schema_version: Literal[1] = 1
     name: str
-    law: Literal["proportional", "linear", "power"]
+    law: LawName
     coefficients: dict[str, float]
     coefficient_intervals: dict[str, tuple[float, float]]
     reference: ReferenceSection

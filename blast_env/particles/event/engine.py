@@ -13,9 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.compilation import compilation_notice, compiled
-from blast_env.particles.event.contacts import collide_balls, collide_with_module
-from blast_env.particles.event.prediction import (
+from blast_env.particles.event.collisions import (
     cell_at,
+    collide_balls,
+    collide_with_module,
     cross,
     enter_cell,
     leave_cell,
@@ -35,8 +36,7 @@ from blast_env.particles.event.state import (
     with_walls,
     world_of,
 )
-from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog
-from blast_env.particles.scene import Scene
+from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog, Scene
 from blast_env.results import EndReason
 
 # Reasons why the loop returns.

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.particles.balls import Balls, CollisionType
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import ModularPart, wall_surface
+from blast_env.particles.objects import Balls, CollisionType, ModularPart, wall_surface
+from blast_env.particles.run import Scene
 from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 RecordArray = NDArray[np.void]

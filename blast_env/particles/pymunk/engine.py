@@ -10,7 +10,7 @@ import pymunk
 from numpy.typing import NDArray
 
 from blast_env.arrays import IntArray
-from blast_env.particles.balls import CollisionType
+from blast_env.particles.objects import CollisionType
 from blast_env.particles.pymunk.space import (
     HALF,
     OUTWARD,
@@ -23,8 +23,7 @@ from blast_env.particles.pymunk.space import (
     build_space,
     height_above,
 )
-from blast_env.particles.run import BallStates, CollisionLog, can_reach
-from blast_env.particles.scene import Scene
+from blast_env.particles.run import BallStates, CollisionLog, Scene, can_reach
 from blast_env.results import EndReason
 
 _TOO_FAST: Final = 2.0

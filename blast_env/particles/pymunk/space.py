@@ -14,9 +14,15 @@ import pymunk.batch
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.particles.balls import Balls, CollisionType
-from blast_env.particles.scene import Scene
-from blast_env.particles.structure import Border, ModularObstacle, ModularPart, wall_surface
+from blast_env.particles.objects import (
+    Balls,
+    Border,
+    CollisionType,
+    ModularObstacle,
+    ModularPart,
+    wall_surface,
+)
+from blast_env.particles.run import Scene
 from blast_env.site.parameters import BallParameters, SimulationParameters
 from blast_env.units import MODULE_SIDE_UNITS
 

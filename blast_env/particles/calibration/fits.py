@@ -1,21 +1,107 @@
-"""The agreement of laws with their reference (paper, section 3.4).
+"""Fits of laws, and their agreement with the reference (paper, section 3).
 
-Beyond the paper: the error at distances left out of the fit, and bootstrap intervals of the
-coefficients.
+A fit takes one impulse per distance: `i_sim` in simulation units and `i_reference` in any unit, for
+the paper's column psi*s. The law gives impulses in the unit of `i_reference`. Beyond the paper: the
+error at distances left out of the fit, and bootstrap intervals of the coefficients.
 """
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
-from blast_env.particles.calibration.laws import FewDistancesWarning, Fit, ScalingLaw
+from blast_env.errors import BlastEnvError, BlastEnvWarning
+from blast_env.particles.calibration.model import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
 from blast_env.statistics import Estimate
 from blast_env.values import Numbers, checked_array
+
+LEAST_DISTANCES: Final = 4
+"""A fit on fewer distances warns: two coefficients then fit almost any data."""
+
+_CONSTANT: Final = 1e-12  # relative spread up to which numbers count as equal
+
+
+class FewDistancesWarning(BlastEnvWarning):
+    """A law was fitted on fewer than `LEAST_DISTANCES` distances."""
+
+
+Fit = Callable[[Numbers, Numbers], ScalingLaw]
+"""One of `fit_proportional`, `fit_linear` and `fit_power_law`."""
+
+
+def fit_proportional(i_sim: Numbers, i_reference: Numbers) -> ProportionalLaw:
+    """Fit i_scaled = k i_sim by least squares (equation 6).
+
+    Args:
+        i_sim: Simulated impulse at each distance, simulation units, at least 0 (n,).
+        i_reference: Reference impulse at each distance, above 0 (n,).
+
+    Raises:
+        BlastEnvError: If there are no numbers to fit, if they are out of bounds, or if `i_sim` is
+            the same everywhere.
+
+    Warns:
+        FewDistancesWarning: If n is below four.
+    """
+    x, y = _checked_pair(i_sim, i_reference)
+    return ProportionalLaw(k=float(x @ y / (x @ x)))
+
+
+def fit_linear(i_sim: Numbers, i_reference: Numbers) -> LinearLaw:
+    """Fit i_scaled = a + b i_sim by least squares (equation 8).
+
+    Arguments, errors and warning as in `fit_proportional`.
+    """
+    return LinearLaw(*_line(*_checked_pair(i_sim, i_reference)))
+
+
+def fit_power_law(i_sim: Numbers, i_reference: Numbers) -> PowerLaw:
+    """Fit i_scaled = A i_sim^B by least squares of the logarithms (section 3.3).
+
+    Arguments, errors and warning as in `fit_proportional`, but `i_sim` must be above 0.
+    """
+    x, y = _checked_pair(i_sim, i_reference)
+    checked_array("i_sim", x, above=0.0)
+    # ln i = ln A + B ln i_sim is a line.
+    intercept, exponent = _line(np.log(x), np.log(y))
+    return PowerLaw(A=float(np.exp(intercept)), B=exponent)
+
+
+def _checked_pair(i_sim: Numbers, i_reference: Numbers) -> tuple[FloatArray, FloatArray]:
+    """Check the impulses of a fit and return them as arrays (n,)."""
+    x = checked_array("i_sim", i_sim, least=0.0, dimensions=1)
+    y = checked_array("i_reference", i_reference, above=0.0, dimensions=1)
+    if len(x) != len(y):
+        raise BlastEnvError(
+            f"i_sim has {len(x)} values and i_reference {len(y)}, must be one per distance each"
+        )
+    if not len(x):
+        raise BlastEnvError("i_sim is empty, must have one value a distance")
+    if np.ptp(x) <= _CONSTANT * x.max():
+        raise BlastEnvError(
+            f"i_sim is {x[0]:g} at every distance ({len(x)}), must differ for a fit"
+        )
+    if len(x) < LEAST_DISTANCES:
+        warnings.warn(
+            f"the fit rests on {len(x)} distances, should be at least {LEAST_DISTANCES}",
+            FewDistancesWarning,
+            stacklevel=3,
+        )
+    return x, y
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return offset and slope of the least-squares line.
+
+    Equation (8) with deviations from the means, which is equal but has smaller rounding errors.
+    """
+    from_mean = x - x.mean()
+    slope = float(from_mean @ (y - y.mean()) / (from_mean @ from_mean))
+    return float(y.mean() - slope * x.mean()), slope
 
 
 @dataclass(frozen=True)
@@ -102,7 +188,7 @@ def leave_one_out(
         distance_m: Distances, ascending (n,), at least three.
         i_sim: Simulated impulse at each distance, simulation units (n,).
         i_reference: Reference impulse at each distance, above 0 (n,).
-        fit: One of the fits of `blast_env.particles.calibration.laws`.
+        fit: One of the fits above.
 
     Raises:
         BlastEnvError: If a number is out of bounds, or no fit is possible with all distances or
@@ -149,7 +235,7 @@ def bootstrap_coefficients(
     Args:
         i_sim_by_seed: Simulated impulses, simulation units (seeds, distances); at least two seeds.
         i_reference: Reference impulse at each distance, above 0 (distances,).
-        fit: One of the fits of this package.
+        fit: One of the fits above.
         resamples: Number of draws, at least 100.
         confidence: Confidence level of the interval, between 0 and 1.
         rng_seed: Seed of the draws; one seed gives one result.
