@@ -99,7 +99,7 @@ def picture(shown: list[Room]) -> Figure:
 
 ROAD: Final = (
     ("evaluation/campaign.py",),
-    ("evaluation/record.py", "evaluation/store.py"),
+    ("evaluation/record.py", "evaluation/evaluator.py"),
     ("evaluation/blasts.py",),
     ("evaluation/questions",),
     ("answers",),

@@ -281,7 +281,6 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
-        check_workers("processes", processes)
         asked = [(self, layout, threat) for layout, threat in pairs]
         return loads_together(asked, processes, progress)
 
@@ -360,6 +359,7 @@ def loads_together(
 
     Arguments and errors are those of `BlastEvaluator.loads_of_many`.
     """
+    check_workers("processes", processes)
     run = partial(_loads, processes=processes)
     found = _together(asked, BlastStore.get, run, BlastStore.add, progress)
     return [
@@ -428,9 +428,6 @@ def _loads(
     """Run blasts; yield (index, loads) when done."""
     # Lots as large as the engine takes less time for than for their parts.
     firsts = range(0, len(blasts), engine.at_once)
-    if len(firsts) == 1:  # as of an episode: nothing to share out
-        yield from enumerate(engine.loads_at_once(blasts))
-        return
     lots = [blasts[first : first + engine.at_once] for first in firsts]
     for lot, of_lot in as_completed(engine.loads_at_once, lots, processes):
         yield from enumerate(of_lot, start=firsts[lot])

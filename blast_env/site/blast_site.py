@@ -106,7 +106,7 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class StructureOutline:
-    """A structure before any blast; attributes as in `particles.structure.ModularObstacle`.
+    """A structure before any blast; attributes as in `particles.objects.ModularObstacle`.
 
     `kind` is the name of its class in the particle model.
     `footprint` is its polygon, `None` for a rectangle and for a barrier.

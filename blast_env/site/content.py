@@ -86,7 +86,7 @@ class Content(Section):
         dict[Name, Component], Field(max_length=100), HashMark.IF_SET, HashMark.IF_RESPONSE
     ] = Field(default_factory=dict)
 
-    @property
+    @cached_property
     def parameters(self) -> SimulationParameters:
         """The parameters of the particle model."""
         return self.simulation.parameters
@@ -144,14 +144,6 @@ class Content(Section):
         radius_m = self.charge_radius_m
         return Surroundings(zone, self.structures, self.charge, radius_m, self.site)
 
-    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
-        """Return the structures that remain with a layout."""
-        zone = self.build_zone
-        if zone is None or not zone.removable:
-            return self.structures
-        away = zone.taken_away(layout)
-        return tuple(structure for structure in self.structures if structure.name not in away)
-
     @property
     def loaded_walls(self) -> tuple[Wall, ...]:
         """The walls of protected structures whose load counts."""
@@ -171,7 +163,8 @@ class Content(Section):
         if key not in self._grounds:
             if len(self._grounds) >= _MOST_GROUNDS:
                 self._grounds.clear()
-            self._grounds[key] = self._ground_of(source, self.structures_with(layout))
+            left = tuple(item for item in self.structures if item.name not in away)
+            self._grounds[key] = self._ground_of(source, left)
         if len(self._grounds_by_identity) >= _MOST_GROUNDS:
             self._grounds_by_identity.clear()
         self._grounds_by_identity[id(source), away] = source, self._grounds[key]

@@ -36,7 +36,7 @@ from blast_env.site.sources import (
     VehicleSource,
     ranked,
 )
-from blast_env.site.structures import PolygonSection
+from blast_env.site.structures import AnyStructure, PolygonSection
 from blast_env.site.zone import BuildZone
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import path_of
@@ -61,6 +61,14 @@ class Scenario(Content):
         georeference: Place of the site on a map or drawing; no result depends on it.
         components: Components of facades by name, beside those of the catalogue.
     """
+
+    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
+        """Return the structures that remain with a layout."""
+        zone = self.build_zone
+        if zone is None or not zone.removable:
+            return self.structures
+        away = zone.taken_away(layout)
+        return tuple(structure for structure in self.structures if structure.name not in away)
 
     @property
     def bays(self) -> tuple[FacadeBay, ...]:
