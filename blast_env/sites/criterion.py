@@ -538,12 +538,15 @@ class VisibilityCriterion:
         least_layout_share: Least share of these that the visibility layout cuts.
         most_layout_share: Largest share that it cuts, and that any straight wall cuts.
         least_advantage: Least difference between its share and the mean share of random layouts.
+        most_open_share: Largest open share: 1 but for rounding. The families refuse a share that
+            rounding puts above 1, since the sites of their seeds are those drawn that way.
     """
 
     least_open_share: float = 0.6
     least_layout_share: float = 0.5
     most_layout_share: float = 0.9
     least_advantage: float = 0.3
+    most_open_share: float = 1.0 + 1e-9
 
     def objection(self, scenario: AnyScenario) -> Objection | None:
         """Return the reason for rejecting a site, or `None` if it is accepted.
@@ -557,8 +560,9 @@ class VisibilityCriterion:
         shares = SiteMeasures.of(scenario)
         advantage = shares.layout_share - shares.random_share
         least, most = self.least_layout_share, self.most_layout_share
+        open_shares = self.least_open_share, self.most_open_share
         for what, value, low, high in (
-            ("open share of the lines of sight", shares.open_share, self.least_open_share, 1.0),
+            ("open share of the lines of sight", shares.open_share, *open_shares),
             ("share cut by the visibility layout", shares.layout_share, least, most),
             ("share cut by the best straight wall", shares.wall_share, 0.0, most),
             ("advantage over random layouts", advantage, self.least_advantage, 1.0),

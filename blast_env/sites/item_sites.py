@@ -144,7 +144,7 @@ class ItemSiteRanges(SquareRanges):
     cvar_probability: Probability = 0.25
 
     criterion: ClassVar = VisibilityCriterion(
-        least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25
+        least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25, most_open_share=1.0
     )
     """A wall may cut all lines in plan, since blast passes over it."""
 

@@ -133,7 +133,7 @@ class KerbSiteRanges(Ranges):
     air_above_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = 3.0
 
     criterion: ClassVar = VisibilityCriterion(
-        least_layout_share=0.2, most_layout_share=1.0, least_advantage=0.05
+        least_layout_share=0.2, most_layout_share=1.0, least_advantage=0.05, most_open_share=1.0
     )
 
     def drawn(self, draws: Draws) -> SiteParts:

@@ -103,7 +103,7 @@ class SiteRanges(SquareRanges):
     duct_module_cost: Amounts = (1.5, 4.0)
     budget_share: Amounts = (0.75, 1.5)
 
-    criterion: ClassVar = VisibilityCriterion()
+    criterion: ClassVar = VisibilityCriterion(most_open_share=1.0)
 
     @model_validator(mode="after")
     def _check_room(self) -> Self:

@@ -3,7 +3,16 @@
 import pytest
 
 from blast_env.site import load_scenario
-from blast_env.sites import Objection, Visibility, VisibilityCriterion, criterion
+from blast_env.sites import (
+    ItemSiteRanges,
+    KerbSiteRanges,
+    Objection,
+    SiteMeasures,
+    SiteRanges,
+    Visibility,
+    VisibilityCriterion,
+    criterion,
+)
 from tests.builders import block
 from tests.sites.cases import yard
 
@@ -40,6 +49,20 @@ def test_a_hidden_house_is_refused() -> None:
     objection = VisibilityCriterion().objection(hidden)
     assert objection is not None
     assert objection.rule == "open share of the lines of sight: must be at least 0.6"
+
+
+def test_rounding_of_an_open_share_refuses_no_site(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the families do, whose seeds were drawn so; their sites stay what they are."""
+    above = SiteMeasures(
+        open_share=1.0 + 2.0**-52, layout_share=0.8, wall_share=0.7, random_share=0.2
+    )
+    monkeypatch.setattr(SiteMeasures, "of", lambda _: above)
+    site = yard()
+    assert VisibilityCriterion().objection(site) is None
+    for ranges in (SiteRanges, ItemSiteRanges, KerbSiteRanges):
+        refused = ranges.criterion.objection(site)
+        assert refused is not None
+        assert refused.rule == "open share of the lines of sight: must be at most 1"
 
 
 def test_a_wall_that_cuts_everything_is_refused() -> None:
