@@ -1,7 +1,7 @@
 """Axis-parallel rectangles, walls in plan; cells, pieces and layouts."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Final, Literal, NamedTuple
@@ -149,6 +149,16 @@ _ALIGNED_COSINE: Final = 1e-9
 
 WallName = Literal["west", "east", "south", "north"]
 """A wall of a structure, by the side that it faces: west is towards smaller x."""
+
+WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
+
+OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
+    "west": (-1.0, 0.0),
+    "east": (1.0, 0.0),
+    "south": (0.0, -1.0),
+    "north": (0.0, 1.0),
+}
+"""Outward normal of each wall."""
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 from blast_env.bundled import LARGE_SITES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
+from blast_env.geometry import OUTWARDS
 from blast_env.site import Scenario, load_scenario
-from blast_env.site.blast_site import OUTWARDS
 from blast_env.sites import HELD_OUT_SITES, SITE_KINDS, close_ranges, generate_site, large_ranges
 
 CLOSE_SITES: Final = "close_sites"

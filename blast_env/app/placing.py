@@ -8,11 +8,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle
+from blast_env.geometry import WALLS, Cell, Element, Layout, Measure, Piece, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario
-from blast_env.site.blast_site import WALLS
 from blast_env.site.catalogue import AnyMeasure, Demolition
 from blast_env.site.facade import Components
 from blast_env.units import MODULE_SIDE_M

@@ -25,7 +25,8 @@ from blast_env.particles.objects import CollisionType
 from blast_env.particles.run import BlastRun
 from blast_env.results import EndReason
 from blast_env.site import AnyScenario, Scenario, find_scenario
-from blast_env.site.blast_site import BARRIER_NAME, BlastSite
+from blast_env.site.blast_site import BlastSite
+from blast_env.site.structures import BARRIER_NAME
 from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import

@@ -35,8 +35,10 @@ from blast_env.gas.source import (
     set_charge,
 )
 from blast_env.gas.spherical_stage import spherical_stage
+from blast_env.geometry import OUTWARDS, WALLS
 from blast_env.results import EndReason
-from blast_env.site.blast_site import OUTWARDS, WALLS, BlastSite, StructureOutline
+from blast_env.site.blast_site import BlastSite
+from blast_env.site.structures import StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final, Self, TypeAlias
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.site.blast_site import WALLS
+from blast_env.geometry import WALLS
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import finite_number
 

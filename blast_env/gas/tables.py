@@ -13,7 +13,8 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.gas.ending import AREA, is_known
 from blast_env.gas.settings import FACE_NAMES, ROOF
-from blast_env.site.blast_site import WALLS, StructureOutline
+from blast_env.geometry import WALLS
+from blast_env.site.structures import StructureOutline
 from blast_env.statistics import counted_parts, mean_over_area
 from blast_env.tables import OF_MODULES, Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M

@@ -9,9 +9,14 @@ import numpy as np
 from blast_env.geometry import Element, Layout, standing
 from blast_env.layout.placement import LayoutState, LegalLayout, check_layout, usable_cells
 from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
-from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
+from blast_env.site.blast_site import BlastSite, Charge, Gauge
 from blast_env.site.content import highest_top_m
-from blast_env.site.structures import ConcreteSquareSection, ground_below_m
+from blast_env.site.structures import (
+    BARRIER_NAME,
+    ConcreteSquareSection,
+    StructureOutline,
+    ground_below_m,
+)
 from blast_env.values import checked_seed
 from blast_env.vehicles.vehicle import NOTHING, Obstacles
 

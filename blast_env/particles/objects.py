@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle, distance_to_rectangle
-from blast_env.site.blast_site import BARRIER_NAME, StructureOutline, module_name
 from blast_env.site.parameters import AirParameters, BallParameters, ExplosiveParameters
+from blast_env.site.structures import BARRIER_NAME, StructureOutline, module_name
 from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 _ROUNDING: Final = 1e-9  # of distances, units

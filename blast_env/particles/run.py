@@ -26,8 +26,9 @@ from blast_env.particles.objects import (
 from blast_env.problems import Problem, ScenarioError
 from blast_env.results import EndReason
 from blast_env.site import AnyCharge, PointSource, Scenario
-from blast_env.site.blast_site import BlastSite, Charge, StructureOutline
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.parameters import SimulationParameters, for_charge
+from blast_env.site.structures import StructureOutline
 from blast_env.site.zone import distance_m
 from blast_env.units import UNITS_PER_M
 

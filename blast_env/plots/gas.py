@@ -16,13 +16,12 @@ from blast_env.arrays import FloatArray
 from blast_env.curves import Friedlander, burst_of, kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasResult
-from blast_env.geometry import Rectangle, WallName
+from blast_env.geometry import WALLS, Rectangle, WallName
 from blast_env.plots.plan import FAINT, QUIET_INK
 from blast_env.plots.site_plan import add_bar, load_colours, write_heading
 from blast_env.plots.style import barrier_text, nice_ceiling, render_extra, unit_interval
 from blast_env.response.sdof import impulses
-from blast_env.site.blast_site import WALLS, StructureOutline
-from blast_env.site.structures import buildings_of
+from blast_env.site.structures import StructureOutline, buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():

@@ -44,7 +44,8 @@ from blast_env.plots.site_plan import (
     write_legend,
 )
 from blast_env.plots.style import barrier_text, render_extra, unit_interval
-from blast_env.site.blast_site import BlastSite, Block, StructureOutline
+from blast_env.site.blast_site import BlastSite
+from blast_env.site.structures import Block, StructureOutline
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():

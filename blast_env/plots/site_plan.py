@@ -25,7 +25,7 @@ from blast_env.plots.plan import (
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
 from blast_env.sections import PointM
-from blast_env.site.blast_site import StructureOutline
+from blast_env.site.structures import StructureOutline
 
 with render_extra():
     from matplotlib import patheffects

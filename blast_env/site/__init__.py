@@ -6,17 +6,10 @@ from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
     from blast_env.bundled import bundled_scenarios
-    from blast_env.geometry import Cell, Element, Layout, Piece
+    from blast_env.geometry import OUTWARDS, WALLS, Cell, Element, Layout, Piece
     from blast_env.problems import Problem, ScenarioError
     from blast_env.sections import DrawingGeoreference, GaugeSection, MapGeoreference, Site
-    from blast_env.site.blast_site import (
-        OUTWARDS,
-        WALLS,
-        BlastSite,
-        Charge,
-        Gauge,
-        StructureOutline,
-    )
+    from blast_env.site.blast_site import BlastSite, Charge, Gauge, in_sight
     from blast_env.site.catalogue import (
         Catalogue,
         Hardening,
@@ -52,7 +45,6 @@ if TYPE_CHECKING:
         with_overrides,
         with_resolution,
     )
-    from blast_env.site.sight import in_sight
     from blast_env.site.sources import (
         AnyCharge,
         AnySource,
@@ -71,6 +63,7 @@ if TYPE_CHECKING:
         ConcreteSquareSection,
         ModularObstacleSection,
         PolygonSection,
+        StructureOutline,
         loaded_walls,
     )
     from blast_env.site.zone import BuildZone, CostArea, KeepOut, distance_m, source_bounds_m

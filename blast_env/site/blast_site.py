@@ -1,37 +1,17 @@
-"""The site of one blast: the input common to all engines, in metres."""
+"""The site of one blast, the input common to all engines, and what its charge has in sight."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cbrt, hypot, pi
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from math import cbrt, hypot, inf, pi
+from typing import Final, NamedTuple
 
-from blast_env.geometry import Cell, Rectangle, WallLine, WallName
-from blast_env.units import MODULE_SIDE_M
+import numpy as np
 
-if TYPE_CHECKING:  # shapely takes a tenth of a second to import
-    from blast_env.site.footprint import Footprint
-
-WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
-
-OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
-    "west": (-1.0, 0.0),
-    "east": (1.0, 0.0),
-    "south": (0.0, -1.0),
-    "north": (0.0, 1.0),
-}
-"""Outward normal of each wall."""
-
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.site.structures import StructureOutline
 
 TNT_KG_M3: Final = 1630.0
 """Density of a charge of TNT."""
-
-BARRIER_NAME: Final = "barrier"
-"""Name of the structure formed by the modules of a layout."""
-
-
-def module_name(x_m: float, y_m: float) -> str:
-    """Return the identifier of the module with this centre."""
-    return f"x{x_m:.3f}_y{y_m:.3f}"
 
 
 class Charge(NamedTuple):
@@ -72,12 +52,12 @@ class BlastSite:
 
     site_m: Rectangle
     charge: Charge
-    structures: tuple["StructureOutline", ...]
+    structures: tuple[StructureOutline, ...]
     gauges: tuple[Gauge, ...] = ()
     air_height_m: float = 12.0
-    build_zone: "StructureOutline | None" = None
+    build_zone: StructureOutline | None = None
 
-    def scaled_distance(self, structure: "StructureOutline") -> float:
+    def scaled_distance(self, structure: StructureOutline) -> float:
         """Return the scaled distance of a structure from the charge, m/kg^(1/3).
 
         The distance is that of its nearest point: in plan, and below its base or above its top.
@@ -88,116 +68,43 @@ class BlastSite:
         return hypot(distance_m, up_m) / cbrt(self.charge.tnt_kg)
 
 
-class Block(NamedTuple):
-    """A single solid: a structure, a piece of a barrier, or a module.
+_TOUCH: Final = 1e-6  # share of a line, within which contact with a block does not cut it
 
-    Attributes:
-        name: Its name; empty for a module.
-        rectangle_m: Its plan.
-        height_m: Height of its top; `None` for as high as the air.
-        base_m: Height of its base above the ground.
+
+def in_sight(site: BlastSite, points_m: FloatArray, outward: FloatArray) -> BoolArray:
+    """Return whether points on walls are visible from the charge, with all blocks of a site (n,).
+
+    Args:
+        site: The site with its charge, structures and barrier.
+        points_m: The points (n, 3).
+        outward: Outward normals there; a wall that faces away is not visible (n, 3).
     """
+    start_m = np.array([*site.charge.position_m, site.charge.height_m])
+    seen = np.asarray(((start_m - points_m) * outward).sum(axis=1) > 0.0)
+    for block in (block for outline in site.structures for block in outline.blocks):
+        left, bottom, right, top = block.rectangle_m
+        high_m = inf if block.height_m is None else block.height_m
+        base_m = block.base_m or -inf  # a block on the ground also cuts lines along the ground
+        low_m, end_m = np.array([left, bottom, base_m]), np.array([right, top, high_m])
+        left_over = np.flatnonzero(seen)
+        seen[left_over] = ~_cut(start_m, points_m[left_over], low_m, end_m)
+    return seen
 
-    name: str
-    rectangle_m: Rectangle
-    height_m: float | None
-    base_m: float
 
-
-@dataclass(frozen=True)
-class StructureOutline:
-    """A structure before any blast; attributes as in `particles.objects.ModularObstacle`.
-
-    `kind` is the name of its class in the particle model.
-    `footprint` is its polygon, `None` for a rectangle and for a barrier.
-
-    Six more are for gas dynamics: `height_m`, the height of its top, `None` for as high as the air;
-    `base_m`, the height of its base above the ground; `heights_m` and `bases_m`, the same for
-    single cells, in the order of `cells`, if they differ; `faces`, the walls whose load counts; and
-    `is_lasting`, whether it is present in every layout.
-    """
-
-    kind: Literal["ModularObstacle", "ConcreteSquare"]
-    name: str
-    corner_m: tuple[float, float]
-    rows: int
-    columns: int
-    protected: bool
-    weight: float
-    cells: tuple[Cell, ...] | None
-    capacity: float | None
-    height_m: float | None = None
-    faces: tuple[WallName, ...] = WALLS
-    heights_m: tuple[float | None, ...] | None = None
-    pieces: tuple[str, ...] | None = None
-    base_m: float = 0.0
-    bases_m: tuple[float, ...] | None = None
-    is_lasting: bool = True
-    footprint: "Footprint | None" = None
-
-    @property
-    def is_barrier(self) -> bool:
-        """Whether it is the barrier of a layout."""
-        return self.name == BARRIER_NAME
-
-    @property
-    def walls(self) -> tuple[WallLine, ...]:
-        """The walls of its polygon; none for a rectangle, whose walls are its sides."""
-        return () if self.footprint is None else self.footprint.walls
-
-    @property
-    def boxes_m(self) -> tuple[Rectangle, ...]:
-        """Its plan in rectangles: of a barrier, the whole grid."""
-        return (self.rectangle_m,) if self.footprint is None else self.footprint.boxes_m
-
-    @property
-    def filled(self) -> tuple[Cell, ...]:
-        """Rows and columns of its modules, row by row."""
-        if self.cells is not None:
-            return self.cells
-        return tuple((row, column) for row in range(self.rows) for column in range(self.columns))
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The rectangle of the whole grid."""
-        size_m = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
-        return Rectangle.from_corner(self.corner_m, size_m)
-
-    def module_name(self, row: int, column: int) -> str:
-        """Return the identifier of the module in a cell."""
-        left, bottom = self.corner_m
-        return module_name(
-            left + (column + 0.5) * MODULE_SIDE_M, bottom + (row + 0.5) * MODULE_SIDE_M
-        )
-
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """The whole structure; the pieces of a barrier, or its modules if it has no pieces."""
-        if self.cells is None or self.footprint is not None:
-            return tuple(Block(self.name, box, self.height_m, self.base_m) for box in self.boxes_m)
-        count = len(self.cells)
-        heights_m = self.heights_m or (self.height_m,) * count
-        bases_m = self.bases_m or (self.base_m,) * count
-        pieces = self.pieces or ("",) * count
-        groups: dict[str | Cell, list[tuple[Cell, float | None, float]]] = {}
-        for cell, piece, top_m, base_m in zip(self.cells, pieces, heights_m, bases_m, strict=True):
-            groups.setdefault(piece or cell, []).append((cell, top_m, base_m))
-        return tuple(
-            Block(
-                key if isinstance(key, str) else "",
-                self._around_m([cell for cell, *_ in group]),
-                *group[0][1:],
-            )
-            for key, group in groups.items()
-        )
-
-    def _around_m(self, cells: Sequence[Cell]) -> Rectangle:
-        """Return the bounding rectangle of cells."""
-        rows, columns = zip(*cells, strict=True)
-        side, (left, bottom) = MODULE_SIDE_M, self.corner_m
-        return Rectangle(
-            left + min(columns) * side,
-            bottom + min(rows) * side,
-            left + (max(columns) + 1) * side,
-            bottom + (max(rows) + 1) * side,
-        )
+def _cut(
+    start_m: FloatArray, points_m: FloatArray, low_m: FloatArray, high_m: FloatArray
+) -> BoolArray:
+    """Return whether lines from a place to points pass through the inside of a box (n,)."""
+    way_m = points_m - start_m
+    # Slab method: a line is in the box between its last entry into and its first exit from the
+    # spaces between two opposite sides. A line along a side is in that space or never.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.stack(((low_m - start_m) / way_m, (high_m - start_m) / way_m))
+    enter, leave = at.min(axis=0), at.max(axis=0)
+    level = way_m == 0.0
+    inside = (low_m <= start_m) & (start_m <= high_m)  # with ends: no gap between adjacent boxes
+    enter[level] = np.broadcast_to(np.where(inside, -inf, inf), level.shape)[level]
+    leave[level] = np.broadcast_to(np.where(inside, inf, -inf), level.shape)[level]
+    first = np.maximum(enter.max(axis=1), _TOUCH)
+    last = np.minimum(leave.min(axis=1), 1.0 - _TOUCH)
+    return np.asarray(first < last - _TOUCH)

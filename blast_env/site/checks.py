@@ -12,12 +12,12 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import TOLERANCE_M, Rectangle
 from blast_env.problems import Problem, extent, unknown_name
 from blast_env.sections import MOST_MODULES, Area, GaugeSection
-from blast_env.site.blast_site import BARRIER_NAME
 from blast_env.site.content import Content, highest_grounds_m, outside_site
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
 from blast_env.site.parameters import for_charge
 from blast_env.site.sources import PlaceSource, VehicleSource
 from blast_env.site.structures import (
+    BARRIER_NAME,
     AnyStructure,
     depth_inside_m,
     is_over_or_below,

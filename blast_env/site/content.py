@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, StrictInt
 
 from blast_env.arrays import any_in_windows, counts_before
-from blast_env.geometry import Element, Rectangle, Wall
+from blast_env.geometry import WALLS, Element, Rectangle, Wall
 from blast_env.problems import Problem, extent
 from blast_env.response.components import Component
 from blast_env.sections import (
@@ -20,7 +20,6 @@ from blast_env.sections import (
     Section,
     Site,
 )
-from blast_env.site.blast_site import WALLS
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.parameters import SimulationParameters, SimulationSection
 from blast_env.site.sources import AnySource, VehicleSource

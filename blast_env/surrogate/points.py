@@ -6,9 +6,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.geometry import WallLine
+from blast_env.geometry import OUTWARDS, WallLine
 from blast_env.site import AnyStructure
-from blast_env.site.blast_site import OUTWARDS
 from blast_env.units import MODULE_SIDE_M
 
 _ALONG_M: Final = 1.0

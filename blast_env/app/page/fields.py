@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from blast_env.app.edits import Document, SiteThing, ThingKind, section_of
-from blast_env.geometry import WallName
+from blast_env.geometry import WALLS, WallName
 from blast_env.site import Scenario
-from blast_env.site.blast_site import WALLS
 from blast_env.site.structures import FacadeSection
 
 Form = Literal["number", "integer", "text", "switch", "walls", "side", "of", "glazing", "wall"]

@@ -11,10 +11,9 @@ from blast_env.app.editor import Editor
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.page.fields import FormField, change_of, fields_of, value_of
 from blast_env.app.page.numbers import NumberField
-from blast_env.geometry import WallName
+from blast_env.geometry import WALLS, WallName
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario
-from blast_env.site.blast_site import WALLS
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
 _PARTS: Final = {"": "the whole building"} | {wall: f"its {wall} side" for wall in WALLS}

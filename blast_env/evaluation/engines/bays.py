@@ -28,7 +28,7 @@ from blast_env.response.facade import FacadeResponse, respond
 from blast_env.response.glass import GlazingCondition
 from blast_env.response.levels import BayDamage
 from blast_env.response.sdof import impulses
-from blast_env.site.blast_site import StructureOutline
+from blast_env.site.structures import StructureOutline
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import

@@ -49,15 +49,14 @@ from blast_env.gas.tables import (
     structure_table,
     wall_table,
 )
-from blast_env.geometry import Element, layout_text
+from blast_env.geometry import WALLS, Element, layout_text
 from blast_env.layout.build_site import build_site, draw_threat, outlines
 from blast_env.provenance import versions
 from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
 from blast_env.response.levels import BayDamage
 from blast_env.results import EndReason, ScaledImpulse
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleCharge, find_scenario
-from blast_env.site.blast_site import WALLS, BlastSite, Charge
-from blast_env.site.sight import in_sight
+from blast_env.site.blast_site import BlastSite, Charge, in_sight
 from blast_env.site.structures import buildings_of
 from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import counted_parts, mean_over_area

@@ -11,9 +11,8 @@ from blast_env.bays import Bay
 from blast_env.evaluation.validation import NOT_KNOWN, Validation, ValidationStatus
 from blast_env.gas.oblique_walls import STEPPED
 from blast_env.gas.settings import cells_unchecked, distance_unchecked
-from blast_env.geometry import Rectangle
-from blast_env.site.blast_site import OUTWARDS, BlastSite
-from blast_env.site.sight import in_sight
+from blast_env.geometry import OUTWARDS, Rectangle
+from blast_env.site.blast_site import BlastSite, in_sight
 from blast_env.units import MODULE_SIDE_M
 
 _OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal

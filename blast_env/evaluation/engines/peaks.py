@@ -16,8 +16,7 @@ import pandas as pd
 
 from blast_env.curves import Ways, in_the_open, normally_reflected
 from blast_env.response.facade import peak_factor
-from blast_env.site.blast_site import BlastSite
-from blast_env.site.sight import in_sight
+from blast_env.site.blast_site import BlastSite, in_sight
 
 
 class PeakSource(StrEnum):

@@ -14,11 +14,10 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Element, Piece
+from blast_env.geometry import WALLS, Element, Piece
 from blast_env.response.barriers import PieceResponses, RigidPiece, piece_responses
 from blast_env.site import Scenario
-from blast_env.site.blast_site import WALLS, module_name
-from blast_env.site.structures import ground_below_m
+from blast_env.site.structures import ground_below_m, module_name
 from blast_env.site.zone import BuildZone
 from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M

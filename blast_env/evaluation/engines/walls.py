@@ -23,11 +23,11 @@ from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.gas.solver import Gas
 from blast_env.gas.tables import means_by_wall
-from blast_env.geometry import WallName
+from blast_env.geometry import WALLS, WallName
 from blast_env.response.facade import peak_factor
 from blast_env.results import ScaledImpulse
 from blast_env.site import AnyStructure
-from blast_env.site.blast_site import WALLS, BlastSite
+from blast_env.site.blast_site import BlastSite
 from blast_env.site.structures import buildings_of
 from blast_env.statistics import counted_parts
 

@@ -38,8 +38,7 @@ from blast_env.response.requirements import Requirement
 from blast_env.response.walls import Panel, panel_of
 from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
-from blast_env.site.blast_site import BlastSite, Charge
-from blast_env.site.sight import in_sight
+from blast_env.site.blast_site import BlastSite, Charge, in_sight
 from blast_env.site.sources import MassPreset
 from blast_env.units import MODULE_SIDE_M
 

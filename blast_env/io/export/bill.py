@@ -10,8 +10,9 @@ from blast_env.geometry import Element, Layout, Piece, Rectangle
 from blast_env.layout import LayoutState, check_layout
 from blast_env.plots.plan import Feature, rounded_m, site_features
 from blast_env.site import Scenario, find_scenario
-from blast_env.site.blast_site import Charge, module_name
+from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Variant
+from blast_env.site.structures import module_name
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M
 

@@ -17,7 +17,8 @@ from blast_env.particles.objects import Colour, LoadColours
 from blast_env.plots.plan import BARRIER, EXPLOSIVE, FAINT, PROTECTED, STRUCTURE
 from blast_env.plots.style import nice_ceiling, unit_interval
 from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge, StructureOutline
+from blast_env.site.blast_site import Charge
+from blast_env.site.structures import StructureOutline
 
 if TYPE_CHECKING:  # Numba takes half a second to import
     from blast_env.evaluation.engines.gas import GasResult
