@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
-from blast_env.vehicles.driving_steps import NEVER, IntArray32, Labels
+from blast_env.vehicles.driving_steps import NEVER, Arcs, IntArray32, Labels
 
 
 @compiled()
@@ -19,11 +19,7 @@ def spread(
     labels: Labels,
     directions: IntArray32,
     lengths: Labels,
-    of: IntArray32,
-    ends: IntArray32,
-    arc_lengths: Labels,
-    first: IntArray32,
-    points: IntArray32,
+    arcs: Arcs,
     arc_most: Labels,
     slow_most: float,
     spot_most: float,
@@ -42,10 +38,7 @@ def spread(
         labels: Labels, at first those of the entries (directions, rows, columns); changed in place.
         directions: The steps (directions, 2).
         lengths: Their lengths (directions,).
-        of: As in `Arcs`.
-        ends: As in `Arcs`.
-        first: As in `Arcs`.
-        points: As in `Arcs`.
+        arcs: The arcs.
         arc_most: The largest label on each arc.
         slow_most: The largest label on an arc over slow places.
         spot_most: The largest label of a turn on the spot.
@@ -55,7 +48,7 @@ def spread(
     spots = np.full(is_open.shape, NEVER)
     spot_limit = np.float32(spot_most)  # in the precision of labels, else the loop would not end
     slow_limit = np.float32(slow_most)
-    arcs = np.searchsorted(of[:, 0], np.arange(count + 1))
+    firsts = np.searchsorted(arcs.of[:, 0], np.arange(count + 1))
     # Label correcting: sweep each direction along itself, so that one sweep carries a label to the
     # end of its line; then the arcs; repeat until no label grows.
     while changed.any():
@@ -72,15 +65,11 @@ def spread(
                 labels,
                 changed,
             )
-            own = range(arcs[number], arcs[number + 1])
+            own = range(firsts[number], firsts[number + 1])
             _follow_arcs(
                 number,
                 own,
-                of,
-                ends,
-                arc_lengths,
-                first,
-                points,
+                arcs,
                 arc_most,
                 is_open,
                 is_slow,
@@ -137,11 +126,7 @@ def _sweep(
 def _follow_arcs(
     number: int,
     own: range,
-    of: IntArray32,
-    ends: IntArray32,
-    arc_lengths: Labels,
-    first: IntArray32,
-    points: IntArray32,
+    arcs: Arcs,
     arc_most: Labels,
     is_open: BoolArray,
     is_slow: BoolArray,
@@ -160,17 +145,18 @@ def _follow_arcs(
             changed[number, row, column] = False
             label = labels[number, row, column]
             for arc in own:
-                other, up, right = of[arc, 1], row + ends[arc, 1], column + ends[arc, 0]
+                other = arcs.of[arc, 1]
+                up, right = row + arcs.ends[arc, 1], column + arcs.ends[arc, 0]
                 if not (0 <= up < rows and 0 <= right < columns):
                     continue
                 # An arc bounds the speed by its lateral acceleration, hence the run-up.
-                value = min(label + arc_lengths[arc], arc_most[arc])
+                value = min(label + arcs.lengths[arc], arc_most[arc])
                 if value <= labels[other, up, right]:
                     continue
                 # Every place along the arc must be open; slow ground on it bounds the speed at its
                 # end.
-                for point in range(first[arc], first[arc + 1]):
-                    v, u = row + points[point, 1], column + points[point, 0]
+                for point in range(arcs.first[arc], arcs.first[arc + 1]):
+                    v, u = row + arcs.points[point, 1], column + arcs.points[point, 0]
                     if not (0 <= v < rows and 0 <= u < columns and is_open[v, u]):
                         value = NEVER
                         break
