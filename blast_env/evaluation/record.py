@@ -400,7 +400,7 @@ class BuildingLoad:
     Attributes:
         impulse_pa_s: Peak specific impulse, mean over the area of the walls.
         peak_pa: Largest overpressure on a face of a cell.
-        counted_pa: The peak to compare with limits; see `blast_env.evaluation.engines.peaks`.
+        counted_pa: The peak to compare with limits; see `blast_env.evaluation.engines.walls`.
         counted_by: Its source.
         arrival_s: Arrival of the wave; NaN if none arrives.
         wall: The wall with the largest impulse.

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         comparison_table,
         metrics_row,
     )
-    from blast_env.particles.recording import write_blast
     from blast_env.particles.run import (
         COLLISION_DTYPE,
         BallStates,
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
         faces_hit,
         module_table,
         structure_table,
+        write_blast,
     )
 else:
     __getattr__, __dir__ = on_first_use(__name__)

@@ -1,6 +1,7 @@
-"""The tables of a blast as data frames, with the unit and the meaning of every column."""
+"""The tables of a blast as data frames, with the unit and the meaning of every column; a workbook."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from blast_env.particles.calibration.load_unit import LoadUnit
 from blast_env.particles.objects import CollisionType, ModularObstacle
 from blast_env.particles.run import CollisionArray, incidence_angle_rad
 from blast_env.tables import OF_MODULES, Column, RunRecord, as_types, texts
+from blast_env.workbook import EXCEL_ROWS, SheetTable, write_workbook
 
 Columns = tuple[Column, ...]
 
@@ -243,3 +245,34 @@ def building_table(structures: pd.DataFrame, buildings: Mapping[str, str]) -> pd
 
 def _or_nan(value: float | None) -> float:
     return np.nan if value is None else value
+
+
+_UNITS: Final = (
+    ("sim", "simulation unit of impulse: sim mass x sim unit / s"),
+    ("sim mass", "simulation unit of mass"),
+    ("sim units/s", "simulation units of length per second; 4 units are 1 m"),
+)
+
+
+def write_blast(blast: BlastTables, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS) -> Path:
+    """Write a workbook with the sheets `Run`, `Structures`, `Modules`, `Collisions`, `Columns`.
+
+    Args:
+        path: The file, with the suffix `.xlsx`; an existing one is replaced.
+        max_rows_per_sheet: The most rows of a table on one sheet, its header included.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is wrong or the file cannot be written there.
+        ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
+    """
+    tables = (
+        SheetTable("Structures", *structures_in_pa_s(blast.structures, blast.load_unit)),
+        SheetTable("Modules", *modules_in_pa_s(blast.modules, blast.load_unit)),
+        SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
+    )
+    return write_workbook(
+        blast.run_record, tables, path, units=_UNITS, max_rows_per_sheet=max_rows_per_sheet
+    )

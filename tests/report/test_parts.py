@@ -12,8 +12,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase, ThreatOutcome
 from blast_env.evaluation.blasts import Severity
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.evaluation.engines.peaks import PeakSource
-from blast_env.evaluation.engines.walls import first_phase_s
+from blast_env.evaluation.engines.walls import PeakSource, first_phase_s
 from blast_env.evaluation.places import chief_threats, other_places, place_text, requested_threats
 from blast_env.evaluation.questions.limits import check_limits
 from blast_env.evaluation.record import BuildingLoad

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.answers.report import Limit, Report
 from blast_env.calibration import kingery_bulmash
-from blast_env.evaluation.engines.peaks import PeakSource, PeakWeight, counted_peak
+from blast_env.evaluation.engines.walls import PeakSource, PeakWeight, counted_peak
 from blast_env.geometry import Layout
 from blast_env.layout import build_site
 from blast_env.response import peak_factor

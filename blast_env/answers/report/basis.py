@@ -6,7 +6,7 @@ from typing import Final
 
 from blast_env.answers.document import AnyCell, AnyPart, Line, Number, Section, Table, lines
 from blast_env.answers.report.summary import charge_words, grid_error_words
-from blast_env.evaluation.engines.peaks import PeakSource
+from blast_env.evaluation.engines.walls import PeakSource
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.grid_error import FACTOR, ORDER
 from blast_env.evaluation.questions.limits import LoadLimit, SiteVerdict

@@ -395,6 +395,6 @@ class BlastResult:
 
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and run record; return its path."""
-        from blast_env.particles.recording import write_blast
+        from blast_env.particles.tables import write_blast
 
         return write_blast(self, path_of(path))

@@ -23,7 +23,7 @@ class Limit:
     Attributes:
         building: Name of the building.
         impulse_pa_s: Largest impulse on its most loaded wall; infinite without a limit.
-        peak_pa: Largest overpressure, see `blast_env.evaluation.engines.peaks`; infinite without a
+        peak_pa: Largest overpressure, see `blast_env.evaluation.engines.walls`; infinite without a
             limit.
     """
 

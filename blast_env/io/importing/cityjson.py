@@ -17,7 +17,7 @@ from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.city_objects import CityGeometry, CityObject, Surface, city_objects
 from blast_env.io.importing.geojson import LOCAL
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.lengths import FOOT_M, UNITS_M
+from blast_env.io.importing.options import FOOT_M, UNITS_M
 from blast_env.io.importing.placing import OUTSIDE
 from blast_env.io.importing.plane import Plane, plane_around, unit_of
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags, code_of, errors_of

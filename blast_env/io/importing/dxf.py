@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.lengths import UNITS_M
+from blast_env.io.importing.options import UNITS_M
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,

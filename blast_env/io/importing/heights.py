@@ -7,7 +7,7 @@ from typing import Final
 
 from blast_env.errors import MAX_TEXT, value_text
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.lengths import FOOT_M, UNITS_M, length_m
+from blast_env.io.importing.options import FOOT_M, UNITS_M, length_m
 from blast_env.io.importing.plane import unit_of
 from blast_env.io.importing.site_map import MapFeature, SiteMap
 

@@ -1,22 +1,15 @@
-"""Lengths as maps write them: numbers and texts with or without a unit.
-
-The options of an import.
-"""
+"""The options of an import, and lengths as maps write them, with or without a unit."""
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isfinite
 from types import MappingProxyType
 from typing import Final
-from blast_env.errors import MAX_TEXT, BlastEnvError
-from blast_env.values import typed_number
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Final
-from blast_env.errors import BlastEnvError, value_text
-from blast_env.units import MODULE_SIDE_M
 
+from blast_env.errors import MAX_TEXT, BlastEnvError, value_text
+from blast_env.units import MODULE_SIDE_M
+from blast_env.values import typed_number
 
 FOOT_M: Final = 0.3048
 """Length of the international foot; that of the American survey foot differs by 2e-6."""

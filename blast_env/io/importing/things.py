@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.errors import BlastEnvError, named, quoted, value_text
 from blast_env.io.importing.heights import HeightReader
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.lengths import length_m
+from blast_env.io.importing.options import length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
