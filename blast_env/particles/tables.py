@@ -1,4 +1,4 @@
-"""The tables of a blast as data frames, with the unit and the meaning of every column; a workbook."""
+"""The tables of a blast as data frames, with unit and meaning of all columns, and as a workbook."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
