@@ -2,7 +2,7 @@
 # Houses become cells of 1 m where the centre of a cell lies in the house. A map that is rounded
 # to half metres has walls that go through centres. One would guess that such a cell is counted by
 # one rule in both directions, and is in one of two houses with a wall in common. From west to
-# east it is so: the cell is in the eastern house. From north to south it is in both, and the
+# east it is so: the cell is in the western house. From north to south it is in both, and the
 # later house has it. A house of 2 m by 2 m alone has 2 by 3 cells, with a row to the south that
 # is too many. 500 houses of 2 to 29 m with walls on half metres have 11 per cent more cells than
 # square metres. In a raster whose rows go north they have neither more nor fewer, and the same
