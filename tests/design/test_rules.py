@@ -403,3 +403,14 @@ def test_a_rule_that_makes_a_site_worse_comes_with_the_word(rule: str, worse: bo
     found = find_proposer(rule).propose(problem, 0)
     assert found.layout
     assert (found.by == WORSE) == worse
+
+
+def test_layouts_by_rule_are_those_of_their_own_charge() -> None:
+    """Two rules share the layout of sight lines, which is that of one site and one charge."""
+    scenario = load_scenario("courtyard")
+    charges = [Charge((5.0, y_m), 100.0) for y_m in (12.0, 18.0)]
+    found = [layouts_by_rule(scenario, charge) for charge in (*charges, *charges)]
+    assert found[:2] == found[2:]
+    assert found[0] != found[1]
+    again = layouts_by_rule(scenario.model_copy(), charges[1])
+    assert again == found[1]
