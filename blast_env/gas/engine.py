@@ -152,7 +152,7 @@ class GasRun:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
         self.end_reason: EndReason | None = None
         # 5. When the run may end.
-        self._groups = _groups(self.table, site, settings.until, watched)
+        self._groups = _groups(self.table, self.grid, site, settings.until, watched)
         self._watches_gauges = settings.until == "gauges" and self.gauges is not None
         places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []
         self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
@@ -203,7 +203,7 @@ class GasRun:
 
         With `until` of "walls", all its faces are included.
         """
-        groups = _groups(self.table, self.site, self.settings.until, [index])
+        groups = _groups(self.table, self.grid, self.site, self.settings.until, [index])
         return not groups or (self.has_come(index) and self._are_known(groups))
 
     @property
@@ -369,15 +369,75 @@ def _assign_walls(table: FaceTable, index: int, footprint: "Footprint") -> None:
     table.outward[own] = np.array([wall.normal for wall in footprint.walls])[table.wall[own]]
 
 
+def counted_faces(
+    table: FaceTable, grid: GasGrid, site: BlastSite, index: int
+) -> NDArray[np.int64]:
+    """Return the indices of the faces on which the load on a structure is assessed (n,).
+
+    They are those of its counted walls that touch air. Where pieces of the barrier hide all of
+    them, the faces of the pieces that lean on these walls take their place: what pushes a piece
+    pushes the wall behind it.
+
+    Args:
+        table: The faces.
+        grid: The grid.
+        site: The site.
+        index: Index of the structure in the site.
+    """
+    outline = site.structures[index]
+    counting = [FACE_NAMES.index(name) for name in outline.faces]
+    own = np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
+    if len(own) or outline.footprint is not None:
+        return own
+    barriers = [k for k, other in enumerate(site.structures) if other.is_barrier]
+    of_pieces = np.isin(table.structure, barriers)
+    leaning = [
+        _leaning_faces(table, grid, outline, np.flatnonzero(of_pieces & (table.face == face)), face)
+        for face in counting
+    ]
+    return np.concatenate(leaning) if leaning else own
+
+
+def _leaning_faces(
+    table: FaceTable,
+    grid: GasGrid,
+    outline: StructureOutline,
+    faces: NDArray[np.int64],
+    wall: int,
+) -> NDArray[np.int64]:
+    """Return those of some faces between which and a wall, an index of `WALLS`, all is solid."""
+    # 1. Faces before the wall, at most as high and as wide as it.
+    axis, is_high = divmod(wall, 2)
+    box, side = outline.rectangle_m, 1 if is_high else -1
+    wall_m = (box.left, box.right, box.bottom, box.top)[wall]
+    low_m, high_m = ((box.bottom, box.top), (box.left, box.right))[axis]
+    centre_m = table.centre_m[faces]
+    away_m = side * (centre_m[:, axis] - wall_m)
+    along_m, z_m = centre_m[:, 1 - axis], centre_m[:, 2]
+    is_before = (away_m > 0.0) & (along_m > low_m) & (along_m < high_m)
+    is_before &= (z_m > outline.base_m) & (z_m < (outline.height_m or np.inf))
+    # 2. Of these, those with solid cells all the way to the wall.
+    found, cells = [], np.round(away_m / grid.cell_m).astype(int)
+    for number in np.flatnonzero(is_before).tolist():
+        solid = [*table.faces.solid[faces[number]]]
+        between = np.arange(cells[number])
+        solid[axis] = solid[axis] - side * between
+        if grid.solid[tuple(solid)].all():
+            found.append(faces[number])
+    return np.array(found, dtype=np.int64)
+
+
 def _groups(
-    table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
+    table: FaceTable, grid: GasGrid, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:
     """Return the faces of each wall that a run waits for: counted walls, or all of them."""
-    groups = (
+    groups = [
         np.flatnonzero((table.structure == index) & (table.face == FACE_NAMES.index(name)))
         for index in watched
         for name in (FACE_NAMES if until == "walls" else site.structures[index].faces)
-    )
+    ]
+    # Pieces may lean on all counted walls; else these are the same faces once more.
+    groups += [counted_faces(table, grid, site, index) for index in watched]
     return [members for members in groups if len(members)]
 
 

@@ -35,7 +35,7 @@ from blast_env.evaluation.validation import (
 )
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
-from blast_env.gas.settings import FACE_NAMES, GasSettings, distance_unchecked
+from blast_env.gas.settings import GasSettings, distance_unchecked
 from blast_env.gas.tables import (
     BUILDING_COLUMNS,
     GAUGE_COLUMNS,
@@ -505,10 +505,10 @@ class GasResult:
         return BlastLoads(self.structure_loads, self.module_impulse_n_s, bays)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
-        """Return the indices of the faces of the counted walls of a structure (n,)."""
-        table = self.run.table
-        counting = [FACE_NAMES.index(name) for name in self.run.site.structures[index].faces]
-        return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
+        """Return the indices of the faces on which the load on a structure is assessed (n,)."""
+        from blast_env.gas.engine import counted_faces  # Numba takes half a second to import
+
+        return counted_faces(self.run.table, self.run.grid, self.run.site, index)
 
     @cached_property
     def _peak_pa(self) -> FloatArray:
