@@ -1,16 +1,17 @@
 """Repeat the blasts of tables with the present engine: `python -m studies.blast_again`.
 
 The loads in a table of `studies.blast_table` depend on the version of the engine. This command
-reads sites, layouts and charges from tables and runs the blasts again, one process per site. Blasts
-are cached in a folder: an interrupted command continues from there, and with more layouts per site
-it runs only the new ones.
+reads sites, layouts and charges from tables and runs the blasts again, one process per site. Each
+site gets a table in a folder: an interrupted command continues from there, and with more layouts
+per site it runs only the new ones. The new tables have the loads at the points of walls, too, which
+those of caches lack.
 """
 
 from collections.abc import Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -18,8 +19,8 @@ import typer
 
 from blast_env.answers.terminal import print_line
 from blast_env.cli.output import progress_bar, user_errors
-from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation import LoadCase
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.parquet import read_frame, write_table
@@ -27,21 +28,8 @@ from blast_env.provenance import versions
 from blast_env.runner import run_all
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.samples import elements
-from blast_env.tables import table_of
-from studies.blast_table import COLUMNS, load_row, named
-from studies.site_names import scenario_of
-
-
-class SiteBlasts(NamedTuple):
-    """The blasts of a site.
-
-    Attributes:
-        name: Name of the site in the table.
-        blasts: Layouts and charges.
-    """
-
-    name: str
-    blasts: tuple[tuple[Layout, Charge], ...]
+from studies.blast_table import COLUMNS, joined
+from studies.site_blasts import SiteBlasts, kept_rows
 
 
 def asked_in(
@@ -64,22 +52,11 @@ def asked_in(
     return found
 
 
-def _blast(row: dict[object, object]) -> tuple[Layout, Charge]:
+def _blast(row: dict[object, object]) -> tuple[Layout, LoadCase]:
     place_m = float(str(row["charge_x_m"])), float(str(row["charge_y_m"]))
     height_m, tnt_kg = float(str(row["charge_height_m"])), float(str(row["tnt_kg"]))
-    return elements(str(row["layout"])), Charge(place_m, tnt_kg, height_m=height_m)
-
-
-def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[str, object]]:
-    """Run the blasts of a site that are missing in the folder; return the rows of all blasts."""
-    site, engine = scenario_of(asked.name), find_engine("gas", cells=cells)
-    evaluator = BlastEvaluator(site, engine, cache=folder)
-    names, rows = dict([named(asked.name, site)]), []
-    for layout, charge in asked.blasts:
-        threat = LoadCase(charge, 0)
-        loads, key = evaluator.loads(layout, threat), evaluator.key(layout, threat)
-        rows += [load_row(names, key, structure) for structure in loads.structures]
-    return rows
+    charge = Charge(place_m, tnt_kg, height_m=height_m)
+    return elements(str(row["layout"])), LoadCase(charge, 0)
 
 
 def main(
@@ -97,14 +74,15 @@ def main(
     """Run the blasts of tables again; write one table for each, with the same file name."""
     with user_errors():
         make_folder(out)
-        run = partial(run_site, cells=cells, folder=out / "blasts")
+        engine = GasEngine() if cells is None else GasEngine(cells=cells)
+        run = partial(kept_rows, engine=engine, folder=out / "blasts")
+        make_folder(out / "blasts")
         for path in tables:
             asked = asked_in(read_frame(path, COLUMNS), layouts, sites)
             with progress_bar(path.stem) as progress:
-                rows: Sequence[list[dict[str, object]]] = run_all(run, asked, processes, progress)
-            blasts = sum(len(name.blasts) for name in asked)
-            table = table_of([row for own in rows for row in own], COLUMNS)
-            write_table(table, COLUMNS, {"blasts": blasts, **versions()}, out / path.name)
+                rows: Sequence[pd.DataFrame] = run_all(run, asked, processes, progress)
+            blasts = sum(len(site.blasts) for site in asked)
+            write_table(joined(rows), COLUMNS, {"blasts": blasts, **versions()}, out / path.name)
             print_line(f"{blasts:,} blasts on {len(asked):,} sites; wrote {out / path.name}")
 
 

@@ -1,15 +1,17 @@
-"""Write the blasts of cache folders as one table of inputs and loads.
+"""Write the blasts of folders as one table of inputs and loads.
 
-Studies, searches and trainings keep their blasts (`--cache`, `--blasts`, a run folder's
-`blasts`). A table of them is training data for a surrogate, and remains valid when a new version
-of the code invalidates the cache.
+Searches and trainings keep their blasts in caches (`--cache`, `--blasts`, a run folder's `blasts`),
+and `studies.surrogate blasts` in a table for each site. A table of them is training data for a
+surrogate, and remains valid when a new version of the code invalidates a cache.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
 
+import numpy as np
+import pandas as pd
 import typer
 
 from blast_env import load_scenario
@@ -18,7 +20,7 @@ from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, BlastStore, StructureLoad
 from blast_env.files import make_folder
-from blast_env.parquet import write_table
+from blast_env.parquet import SUFFIX, read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.site import Scenario, bundled_scenarios
 from blast_env.sites import ITEM_SITES
@@ -46,12 +48,28 @@ COLUMNS: Final = (
     Column("protected", "", "whether its load counts"),
     Column("impulse_pa_s", "Pa s", "mean impulse on the assessed walls"),
     Column("peak_pa", "Pa", "largest overpressure on them; missing for particles"),
+    Column(
+        "point_impulses_pa_s", "Pa s", "JSON: at the points of `WallPoints`; [] if unknown", True
+    ),
+    Column("point_peaks_pa", "Pa", "JSON: the largest overpressures there; [] if unknown", True),
 )
 """One row per structure and blast."""
 
+BLAST: Final = (
+    "scenario_hash",
+    "layout",
+    "charge_x_m",
+    "charge_y_m",
+    "charge_height_m",
+    "tnt_kg",
+    "seed",
+    "engine",
+)
+"""Columns that tell one blast from another."""
+
 
 def main(
-    folders: Annotated[list[Path], typer.Argument(help="Folders with blasts.")],
+    folders: Annotated[list[Path], typer.Argument(help="Folders with blasts, and tables to join.")],
     out: Annotated[Path, typer.Option(help="The table, .parquet.")] = Path("out/blasts.parquet"),
     sites: Annotated[
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
@@ -70,20 +88,45 @@ def main(
         names = dict(named(name, load_scenario(name)) for name in known)
         for name in site_names(kind or [ITEM_SITES], first, sites):
             names.update([named(name, scenario_of(name))])
-        rows: dict[str, list[dict[str, object]]] = {}
-        for folder in folders:
-            if not folder.is_dir():
-                raise BlastEnvError(f"{folder}: is no folder of blasts")
-            for key, loads in BlastStore(folder).items():
-                rows[json.dumps(key)] = [
-                    load_row(names, key, structure) for structure in loads.structures
-                ]
-        if not rows:
+        tables = [rows for folder in folders for rows in _tables(folder, names)]
+        if not any(map(len, tables)):
             raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")
-        table = table_of([row for own in rows.values() for row in own], COLUMNS)
+        table = joined(tables)
+        blasts = table.groupby(list(BLAST)).ngroups
         make_folder(out.parent)
-        write_table(table, COLUMNS, {"blasts": len(rows), **versions()}, out)
-    print_line(f"{len(rows):,} blasts; wrote {out}")
+        write_table(table, COLUMNS, {"blasts": blasts, **versions()}, out)
+    print_line(f"{blasts:,} blasts; wrote {out}")
+
+
+def _tables(source: Path, names: Mapping[str, "NamedSite"]) -> Iterator[pd.DataFrame]:
+    """Yield the tables of a source: a table, a folder of tables, or the folder of a cache.
+
+    Raises:
+        BlastEnvError: If it is neither a folder nor a table.
+    """
+    if source.suffix == SUFFIX:
+        yield read_frame(source, COLUMNS)
+        return
+    if not source.is_dir():
+        raise BlastEnvError(f"{source}: is no folder of blasts")
+    of_sites = sorted(source.glob(f"*{SUFFIX}"))
+    for path in of_sites:
+        yield read_frame(path, COLUMNS)
+    if not of_sites:
+        rows = [
+            load_row(names, key, structure)
+            for key, loads in BlastStore(source).items()
+            for structure in loads.structures
+        ]
+        yield table_of(rows, COLUMNS)
+
+
+def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Return the rows of tables, each once: of equal ones that with loads at points, if any."""
+    rows = pd.concat([table for table in tables if len(table)], ignore_index=True)
+    order = np.argsort((rows["point_impulses_pa_s"] == "[]").to_numpy(), kind="stable")
+    once = rows.iloc[order].drop_duplicates([*BLAST, "structure"])
+    return once.sort_index().reset_index(drop=True)
 
 
 class NamedSite(NamedTuple):
@@ -104,7 +147,11 @@ def named(name: str, site: Scenario) -> tuple[str, NamedSite]:
 
 
 def load_row(
-    names: Mapping[str, NamedSite], key: BlastKey, load: StructureLoad
+    names: Mapping[str, NamedSite],
+    key: BlastKey,
+    load: StructureLoad,
+    point_impulses: str = "[]",
+    point_peaks: str = "[]",
 ) -> dict[str, object]:
     """Return the row of a structure under a blast.
 
@@ -112,6 +159,8 @@ def load_row(
         names: Scenarios by the hash in the keys of their blasts; others have no name.
         key: The blast.
         load: Its load on the structure.
+        point_impulses: The impulses at the points of its walls, as JSON.
+        point_peaks: The largest overpressures there.
     """
     site = names.get(key.scenario_hash, NamedSite("", key.scenario_hash))
     x_m, y_m = key.charge.position_m
@@ -129,6 +178,8 @@ def load_row(
         "protected": load.protected,
         "impulse_pa_s": load.impulse_pa_s,
         "peak_pa": load.peak_pa,
+        "point_impulses_pa_s": point_impulses,
+        "point_peaks_pa": point_peaks,
     }
 
 

@@ -25,7 +25,7 @@ from blast_env.design.search.moves import Moves, random_walls
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
-from blast_env.evaluation.engines import Engine, find_engine
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.parquet import read_frame
@@ -51,11 +51,12 @@ from blast_env.surrogate.samples import Loads, Samples
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS
+from studies.site_blasts import SiteBlasts, kept_rows
 from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet")
-    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further")
+    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further", "point")
 )
 """Data of the packaged surrogate: blasts on generated sites."""
 
@@ -100,15 +101,16 @@ def blasts(
 ) -> None:
     """Run blasts on generated sites for the layouts of a recipe: rules, random, changed rules.
 
-    Cached blasts are not repeated. `studies.blast_table` turns the cache into a table.
+    Each site gets a table in the folder; blasts that it has are not repeated. `studies.blast_table`
+    joins the tables.
     """
     with user_errors(), running_on(cluster):
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
         recipe = Recipe(layouts, rules, liked, favourites, changes, draws)
         names = site_names([kind], first, sites)
-        engine = find_engine("gas", cells=cells)
-        run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, cache=cache)
+        engine = GasEngine() if cells is None else GasEngine(cells=cells)
+        run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, folder=cache)
         with progress_bar("sites") as progress:
             run_all(run, names, processes, progress)
 
@@ -160,15 +162,16 @@ class Recipe:
         return list(dict.fromkeys(tuple(sorted(layout)) for layout in found))
 
 
-def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: Path) -> int:
-    """Run the blasts of one site; return the number of new ones."""
-    site = scenario_of(name)
-    evaluator = BlastEvaluator(site, engine, cache=cache)
-    seed = int(name.rpartition("/")[-1])
-    for threat in draw_threats(site, range(threats)):
-        tried = recipe.of(site, threat, seed)
-        evaluator.loads_of_many([(layout, threat) for layout in tried])
-    return evaluator.counts.blasts
+def site_blasts(name: str, recipe: Recipe, threats: int, engine: GasEngine, folder: Path) -> int:
+    """Run the blasts of one site, but for those in the folder; return their number."""
+    site, seed = scenario_of(name), int(name.rpartition("/")[-1])
+    blasts = tuple(
+        (layout, threat)
+        for threat in draw_threats(site, range(threats))
+        for layout in recipe.of(site, threat, seed)
+    )
+    kept_rows(SiteBlasts(name, blasts), engine, folder)
+    return len(blasts)
 
 
 @app.command("fit")

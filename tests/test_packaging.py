@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -87,6 +88,21 @@ def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(
     assert Path(where).is_relative_to(clean)
     assert names == str(sorted(path.stem for path in (REPOSITORY / "scenarios").glob("*.toml")))
     assert data == f"{list(CALIBRATIONS)} 8 1543"
+
+
+def test_a_wheel_says_where_the_published_blasts_are(clean: Path, tmp_path: Path) -> None:
+    code = (
+        "from blast_env.benchmark.data import load\n"
+        "from blast_env.errors import BlastEnvError\n"
+        "try: load()\n"
+        "except BlastEnvError as error: print(error)\n"
+        "print(len(load(paths=['table.parquet'])))"
+    )
+    shutil.copy(REPOSITORY / "docs" / "data" / "gas_blasts.parquet", tmp_path / "table.parquet")
+    where, rows = call(clean / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
+    assert "its tables are in docs/data of the repository, not in the package" in where
+    assert int(rows) > 1000
+    assert not [*clean.glob("lib/python*/site-packages/blast_env/**/*_blasts.parquet")]
 
 
 def test_a_search_runs_beside_a_package_named_agents_and_without_extras(

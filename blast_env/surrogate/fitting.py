@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import starmap
 from math import ceil
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import torch
@@ -18,6 +19,7 @@ from blast_env.surrogate.layers import SingleArray
 from blast_env.surrogate.network import (
     MESSAGE,
     SHAPES,
+    AnyFloats,
     Fit,
     Member,
     Networks,
@@ -40,6 +42,9 @@ _GROUP: Final = 24
 _COMMON: Final = 0.2
 """Weight of the error common to all layouts of a case, which does not affect their ranking."""
 
+_AT_POINTS: Final = 1.0
+"""Weight of the errors at points, where loads there are known, beside those of their means."""
+
 _RATE: Final = 1e-2
 _DECAY: Final = 1e-3
 _MOST_GRADIENT: Final = 1.0
@@ -51,6 +56,9 @@ _POINTS: Final = 12
 
 _EVEN: Final = 1.28
 """Bias at which the bend of a layer is 1."""
+
+_SAMPLES_AT_ONCE: Final = 1000
+"""Samples that are predicted at once."""
 
 _AT_ONCE: Final = 2**20
 """Rows that are scaled at once."""
@@ -102,13 +110,25 @@ def fit(
 def _scales(samples: Samples, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Return mean and standard deviation of features, relations and traits (INPUTS,)."""
     given = (
-        samples.features[np.repeat(chosen, samples.counts)],
-        samples.relations[np.repeat(chosen, samples.counts * samples.solids)],
-        samples.traits[np.repeat(chosen, samples.pieces)],
+        (samples.features, np.repeat(chosen, samples.counts)),
+        (samples.relations, np.repeat(chosen, samples.counts * samples.solids)),
+        (samples.traits, np.repeat(chosen, samples.pieces)),
     )
-    mean = np.concatenate([array.mean(axis=0, dtype=np.float64) for array in given])
-    scale = np.concatenate([array.std(axis=0, dtype=np.float64) for array in given])
-    return mean, scale + _LEAST_SCALE
+    mean, variance = (np.concatenate(item) for item in zip(*starmap(_moments, given), strict=True))
+    return mean, np.sqrt(variance) + _LEAST_SCALE
+
+
+def _moments(numbers: AnyFloats, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance of the chosen rows, part by part: there are gigabytes of them."""
+    sums, squares = np.zeros(numbers.shape[1]), np.zeros(numbers.shape[1])
+    for first in range(0, len(numbers), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        own = numbers[part][chosen[part]].astype(np.float64)
+        sums += own.sum(axis=0)
+        squares += (own**2).sum(axis=0)
+    count = max(int(chosen.sum()), 1)
+    mean = sums / count
+    return mean, np.maximum(squares / count - mean**2, 0.0)
 
 
 def _cases(samples: Samples, chosen: BoolArray) -> list[IntArray]:
@@ -186,6 +206,27 @@ def predictions(
     chosen: BoolArray,
 ) -> Predictions:
     """Predict one kind of load, by `networks` of the surrogate, on the `chosen` samples."""
+    # Part by part: there are gigabytes of messages.
+    numbers = np.flatnonzero(chosen)
+    parts = np.array_split(numbers, max(1, ceil(len(numbers) / _SAMPLES_AT_ONCE)))
+    logs = np.concatenate(
+        [
+            _log_loads(surrogate, networks, samples, loads, _mask(len(samples), own))
+            for own in parts
+        ],
+        axis=1,
+    )
+    return Predictions(agreed(logs), logs.std(axis=0))
+
+
+def _log_loads(
+    surrogate: Surrogate,
+    networks: Networks,
+    samples: Samples,
+    loads: Loads,
+    chosen: BoolArray,
+) -> FloatArray:
+    """Return what each network predicts on the `chosen` samples (members, samples)."""
     counts, points = samples.counts[chosen], np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
     # 1. What each solid says to each point; 2. the sum over the solids, sample by sample; 3. the
@@ -208,8 +249,13 @@ def predictions(
     ]
     differs = networks(surrogate.scaled(samples.features[points]), np.concatenate(heard, axis=2))
     known, area_m2 = loads.known[points], samples.area_m2[points]
-    logs = log_loads(differs, known, area_m2, starts, loads.power)
-    return Predictions(agreed(logs), logs.std(axis=0))
+    return log_loads(differs, known, area_m2, starts, loads.power)
+
+
+def _mask(count: int, numbers: IntArray) -> BoolArray:
+    found: BoolArray = np.zeros(count, dtype=bool)
+    found[numbers] = True
+    return found
 
 
 def _heard(
@@ -283,20 +329,24 @@ class _Target:
     Attributes:
         known: As in `Loads`.
         target: As in `Loads`.
+        at_points: As in `Loads`.
         power: As in `Loads`.
+        is_known: Where `at_points` is known (points,).
     """
 
     known: Tensor
     target: Tensor
+    at_points: Tensor
     power: float
+    is_known: BoolArray
 
     @classmethod
     def of(cls, loads: Loads, device: str) -> "_Target":
-        known, target = (
+        known, target, at_points = (
             torch.from_numpy(array.astype(np.float32)).to(device)
-            for array in (loads.known, loads.target)
+            for array in (loads.known, loads.target, loads.at_points)
         )
-        return cls(known, target, loads.power)
+        return cls(known, target, at_points, loads.power, ~np.isnan(loads.at_points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +356,8 @@ class _Tensors:
     Attributes:
         samples: The samples.
         features: Scaled features (points, FEATURES).
-        relations: Scaled relations (rows, RELATIONS).
+        relations: Scaled relations, in half precision: there are gigabytes of them (rows,
+            RELATIONS).
         traits: Scaled traits (pieces, TRAITS).
         area_m2: Wall area represented by each point (points,).
         starts: Index of the first point of each sample (samples,).
@@ -328,10 +379,11 @@ class _Tensors:
     @classmethod
     def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray, device: str) -> "_Tensors":
         bounds = np.split(np.arange(INPUTS), (FEATURES, FEATURES + RELATIONS))
-        given = samples.features, samples.relations, samples.traits
+        given: tuple[AnyFloats, ...] = samples.features, samples.relations, samples.traits
+        kinds: tuple[type[np.floating[Any]], ...] = np.float32, np.float16, np.float32
         features, relations, traits = (
-            torch.from_numpy(_bounded(item, mean[own], scale[own])).to(device)
-            for item, own in zip(given, bounds, strict=True)
+            torch.from_numpy(_bounded(item, mean[own], scale[own], kind)).to(device)
+            for item, own, kind in zip(given, bounds, kinds, strict=True)
         )
         area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32)).to(device)
         numbers = samples.counts, samples.counts * samples.solids, samples.pieces
@@ -348,29 +400,35 @@ class _Tensors:
     ) -> Tensor:
         """Return the mean square error of the logarithm on groups of samples, each of one case.
 
-        The mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
+        It is that of the loads on structures, plus that at points of walls where those loads are
+        known. A mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
 
         Returns:
             Of each network (members,).
         """
-        # A common error of all layouts of a case ranks none of them, so it counts less.
-        errors = self._errors(networks, target, groups, rng)
-        parts = errors.split([*map(len, groups)], dim=1)  # type: ignore[no-untyped-call]
-        common = torch.cat([part.mean(1, keepdim=True).expand_as(part) for part in parts], dim=1)
-        return (errors - common).square().mean(1) + _COMMON * common.square().mean(1)
-
-    def _errors(
-        self,
-        networks: "_Stack",
-        target: _Target,
-        groups: Sequence[IntArray],
-        rng: np.random.Generator,
-    ) -> Tensor:
-        """Return the errors of the logarithm at some points of samples (members, samples)."""
-        # 1. The rows of all inputs: layouts of a case have its structures in common.
         rows = _Rows(*map(self._indices, _rows_of(self, groups, rng)))
         over = networks(self, rows)
-        # 2. The load of a structure: the power mean of its points, by area.
+        # A common error of all layouts of a case ranks none of them, so it counts less.
+        errors = self._errors(over, target, rows)
+        own = np.repeat(np.arange(len(groups)), [*map(len, groups)])
+        of_loads = _mean_square(errors, self._indices(own), len(groups))
+        # A point of a wall has one load for each layout: a case of its own.
+        known = self._indices(np.flatnonzero(target.is_known[rows.behind.cpu().numpy()]))
+        if not len(known):
+            return of_loads
+        at_points = target.known[rows.behind] + over - target.at_points[rows.behind]
+        errors, walls = at_points[:, known], rows.wall[known]
+        return of_loads + _AT_POINTS * _mean_square(errors, walls, len(rows.walls))
+
+    def _errors(self, over: Tensor, target: _Target, rows: "_Rows") -> Tensor:
+        """Return the errors of the logarithm of the loads on structures (members, samples).
+
+        Args:
+            over: What the networks say at points behind layouts (members, points).
+            target: The loads.
+            rows: The samples, and their points.
+        """
+        # The load of a structure: the power mean of its points, by area.
         logs = target.power * (target.known[rows.behind] + over)
         empty = logs.new_zeros(len(logs), len(rows.samples))
         # Relative to the largest: high powers of pascals overflow.
@@ -386,6 +444,20 @@ class _Tensors:
 
     def _indices(self, numbers: IntArray) -> Tensor:
         return torch.from_numpy(numbers).to(self.device)
+
+
+def _mean_square(errors: Tensor, group: Tensor, groups: int) -> Tensor:
+    """Return the mean square of errors, the mean of a group with the weight `_COMMON` (members,).
+
+    Args:
+        errors: The errors (members, errors).
+        group: Number of the group of each (errors,).
+        groups: Number of groups.
+    """
+    sums = errors.new_zeros(len(errors), groups).index_add(1, group, errors)
+    counts = errors.new_zeros(groups).index_add(0, group, torch.ones_like(errors[0]))
+    common = (sums / counts.clamp(min=1.0))[:, group]
+    return (errors - common).square().mean(1) + _COMMON * common.square().mean(1)
 
 
 class _Rows(NamedTuple):
@@ -470,12 +542,14 @@ def _some_points(count: int, rng: np.random.Generator) -> IntArray:
     return found
 
 
-def _bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> SingleArray:
-    """Return `bounded` in single precision, part by part: there are gigabytes of relations."""
-    found = np.empty(numbers.shape, dtype=np.float32)
+def _bounded(
+    numbers: AnyFloats, mean: FloatArray, scale: FloatArray, kind: type[np.floating[Any]]
+) -> AnyFloats:
+    """Return `bounded` in another precision, part by part: there are gigabytes of relations."""
+    found = np.empty(numbers.shape, dtype=kind)
     for first in range(0, len(numbers), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
-        found[part] = bounded(numbers[part], mean, scale)
+        found[part] = bounded(numbers[part].astype(np.float64), mean, scale)
     return found
 
 
@@ -507,8 +581,8 @@ class _Stack(nn.Module):
         # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sums give the load.
         layers = [*self.layers]
         first, first_bias, second, second_bias, last, last_bias = layers[12:]
-        structures = _two_layers(data.relations[rows.structures], layers[:4])
-        pieces = _two_layers(data.relations[rows.related], layers[4:8])
+        structures = _two_layers(data.relations[rows.structures].float(), layers[:4])
+        pieces = _two_layers(data.relations[rows.related].float(), layers[4:8])
         # Each message of a piece is weighted, number by number, by its traits.
         weights = _two_layers(data.traits[rows.pieces], layers[8:12])
         pieces = pieces * weights.index_select(1, rows.piece)

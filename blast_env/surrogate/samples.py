@@ -1,6 +1,7 @@
 """Samples for a fit of the surrogate: loads of structures, with what its networks see of them."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Final
@@ -19,6 +20,15 @@ from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import site_of
 
+_BLOCK: Final = 2**20
+"""Rows of relations that are copied at once."""
+
+_UNKNOWN: Final = "[]"
+"""Loads at points that were not recorded."""
+
+_LEAST_LOAD: Final = 1.0
+"""Least load at a point before its logarithm, Pa s or Pa: where no wave came, it is 0."""
+
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 
 
@@ -29,11 +39,14 @@ class Loads:
     Attributes:
         known: Logarithm of Kingery and Bulmash's load at all points (points,).
         target: Logarithm of the load by gas dynamics (samples,).
+        at_points: Logarithm of the load by gas dynamics at all points, NaN where it is not known
+            (points,).
         power: Exponent of the mean over the points of a structure.
     """
 
     known: FloatArray
     target: FloatArray
+    at_points: SingleArray
     power: float
 
 
@@ -59,7 +72,7 @@ class Samples:
     """
 
     features: FloatArray
-    relations: FloatArray
+    relations: SingleArray
     traits: FloatArray
     area_m2: FloatArray
     counts: np.ndarray
@@ -99,7 +112,8 @@ class Samples:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         # 1. Each site once; each blast once, with the features of all points of its walls.
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
-        features, related, area_m2, impulses, peaks = [], [], [], [], []
+        features, area_m2, impulses, peaks = [], [], [], []
+        related, solids = _Rows(), []
         traits: list[SingleArray] = []
         standing: list[int] = []
         wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
@@ -118,7 +132,8 @@ class Samples:
             for *_, structure in loads:
                 own = approach.points_of(names.index(structure))
                 features.append(of_points[own])
-                related.append(of_solids[:, own].astype(np.float32))
+                related.add(of_solids[:, own])
+                solids.append(len(of_solids))
                 traits.append(of_pieces)
                 standing.append(len(approach.solids))
                 area_m2.append(approach.area_m2[own])
@@ -126,22 +141,25 @@ class Samples:
                 peaks.append(approach.log_peak[own])
         # 3. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
+        counts = np.array([len(feature) for feature in features])
         return cls(
             features=np.concatenate(features),
-            relations=np.concatenate([thing.reshape(-1, RELATIONS) for thing in related]),
+            relations=related.joined(),
             traits=np.concatenate([own.reshape(-1, TRAITS) for own in traits]),
             area_m2=np.concatenate(area_m2),
-            counts=np.array([len(feature) for feature in features]),
-            solids=np.array([len(thing) for thing in related]),
+            counts=counts,
+            solids=np.array(solids),
             structures=np.array(standing),
             impulse=Loads(
                 np.concatenate(impulses),
                 np.log(rows["impulse_pa_s"].to_numpy()),
+                _at_points(rows["point_impulses_pa_s"], counts),
                 IMPULSE_POWER,
             ),
             peak=Loads(
                 np.concatenate(peaks),
                 np.log(rows["peak_pa"].to_numpy()),
+                _at_points(rows["point_peaks_pa"], counts),
                 PEAK_POWER,
             ),
             site=rows.groupby("scenario_hash").ngroup().to_numpy(),
@@ -149,6 +167,63 @@ class Samples:
             case=place.groupby(list(place.columns)).ngroup().to_numpy(),
             layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
         )
+
+
+class _Rows:
+    """Relations one after the other, in blocks: there are gigabytes of them.
+
+    Many small arrays would leave as much memory behind as they took, so they are copied early.
+    """
+
+    def __init__(self) -> None:
+        self._blocks: list[SingleArray] = []
+        self._parts: list[SingleArray] = []
+        self._count = 0
+
+    def add(self, relations: FloatArray) -> None:
+        """Add the relations of solids to the points of a sample (solids, points, RELATIONS)."""
+        self._parts.append(relations.astype(np.float32).reshape(-1, RELATIONS))
+        self._count += len(self._parts[-1])
+        if self._count >= _BLOCK:
+            self._end_block()
+
+    def joined(self) -> SingleArray:
+        """Return all of them (rows, RELATIONS), and forget them."""
+        self._end_block()
+        rows = sum(map(len, self._blocks))
+        found, first = np.empty((rows, RELATIONS), dtype=np.float32), 0
+        self._blocks.reverse()
+        while self._blocks:
+            block = self._blocks.pop()
+            found[first : first + len(block)] = block
+            first += len(block)
+        return found
+
+    def _end_block(self) -> None:
+        if self._parts:
+            self._blocks.append(np.concatenate(self._parts))
+        self._parts, self._count = [], 0
+
+
+def _at_points(texts: Iterable[str], counts: IntArray) -> SingleArray:
+    """Return the logarithms of the loads at points, NaN where they are not known (points,).
+
+    Args:
+        texts: The loads at the points of each sample, as JSON; `[]` if they are not known.
+        counts: Number of points of each sample (samples,).
+
+    Raises:
+        BlastEnvError: If a sample has loads at another number of points.
+    """
+    found = np.full(counts.sum(), np.nan, dtype=np.float32)
+    for text, end, count in zip(texts, np.cumsum(counts).tolist(), counts.tolist(), strict=True):
+        if text == _UNKNOWN:
+            continue
+        loads = np.array(json.loads(text), dtype=np.float64)
+        if len(loads) != count:
+            raise BlastEnvError(f"a row has loads at {len(loads)} points, must have {count}")
+        found[end - count : end] = np.log(np.maximum(loads, _LEAST_LOAD))
+    return found
 
 
 def elements(text: str) -> tuple[Element, ...]:

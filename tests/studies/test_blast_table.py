@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 import typer
@@ -16,6 +17,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Piece
 from blast_env.parquet import read_frame, write_table
 from blast_env.site import Charge
+from blast_env.surrogate import WallPoints
 from studies import blast_again, blast_table
 from studies.blast_table import COLUMNS
 from studies.site_names import scenario_of, site_names
@@ -111,6 +113,8 @@ def old_rows(layouts: list[str]) -> pd.DataFrame:
         "protected": True,
         "impulse_pa_s": 1.0,
         "peak_pa": 1.0,
+        "point_impulses_pa_s": "[]",
+        "point_peaks_pa": "[]",
     }
     return pd.DataFrame([values | {"layout": layout} for layout in layouts * 2])[NAMES]
 
@@ -119,7 +123,7 @@ def test_each_blast_is_asked_for_once_the_empty_site_first() -> None:
     (asked,) = blast_again.asked_in(old_rows([WALL, "[]"]), None)
     assert asked.name == SITE
     assert [len(layout) for layout, _ in asked.blasts] == [0, 1]
-    assert {charge for _, charge in asked.blasts} == {Charge((10.0, 3.0), 20.0)}
+    assert {threat.charge for _, threat in asked.blasts} == {Charge((10.0, 3.0), 20.0)}
     (fewer,) = blast_again.asked_in(old_rows([WALL, "[]"]), 1)
     assert fewer.blasts == asked.blasts[:1]
 
@@ -137,5 +141,29 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
     loads = {structure.name: structure.impulse_pa_s for structure in blast.run().loads().structures}
     assert dict(zip(found["structure"], found["impulse_pa_s"], strict=True)) == loads
     assert set(found["scenario"]) == {SITE}
+    (hotel,) = found[found["structure"] == "hotel"].to_dict("records")
+    points = WallPoints.on([load_scenario(SITE).structures[0]], load_scenario(SITE).air_height_m)
+    impulses, peaks = (json.loads(hotel[f"point_{name}"]) for name in ("impulses_pa_s", "peaks_pa"))
+    assert len(impulses) == len(peaks) == len(points.area_m2)
+    # Their mean by area is the load on the structure, but for faces that are halved by a border.
+    assert np.average(impulses, weights=points.area_m2) == pytest.approx(loads["hotel"], rel=0.02)
+    assert max(peaks) == pytest.approx(hotel["peak_pa"], rel=1e-3)
+    other = found[found["structure"] != "hotel"]
+    assert set(other["point_impulses_pa_s"]) <= {"[]"}
     monkeypatch.setattr(GasBlast, "run", None)
     blast_again.main([table], tmp_path / "again", cells="coarse", processes=1)
+
+
+def test_tables_are_joined_and_rows_with_loads_at_points_win(tmp_path: Path) -> None:
+    known = old_rows([WALL, "[]"]).assign(point_impulses_pa_s="[1.0]")
+    tables, folder = [old_rows([WALL]), known], tmp_path / "sites"
+    folder.mkdir()
+    for number, table in enumerate(tables):
+        write_table(table, COLUMNS, {}, folder / f"site-{number}.parquet")
+    out = tmp_path / "all.parquet"
+    code, words = run(folder, folder / "site-0.parquet", "--out", out)
+    assert (code, words.split(";")[0]) == (0, "2 blasts")
+    found = read_frame(out, COLUMNS)
+    assert found["layout"].tolist() == [WALL, "[]"]
+    assert set(found["point_impulses_pa_s"]) == {"[1.0]"}
+    assert run(tmp_path / "none", "--out", out)[0] == 2

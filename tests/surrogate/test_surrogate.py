@@ -513,6 +513,7 @@ def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:
         ("", YARD.content_hash, json.dumps(layout), *charge.position_m, 0.0, 5.0, 0, "gas")
         + (structure.name, True)
         + (float(said.impulse_pa_s[number, column]), float(said.peak_pa[number, column]))
+        + ("[]", "[]")
         for number, (layout, charge) in enumerate(zip(tried, charges, strict=True))
         for column, structure in enumerate(site.protected)
     ]
@@ -536,6 +537,45 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     once, again = (fit(samples, held[0], 1, 0, ABOUT) for _ in range(2))
     assert len(once.impulse.members) == len(once.peak.members) == MEMBERS
     assert once.digest == again.digest
+
+
+def test_loads_at_points_count_beside_their_mean() -> None:
+    """They contradict the means here by 0.5 in the logarithm: the fit ends between both."""
+    table = table_of_guesses(by_hand(), 40)
+    samples = Samples.of(table, {YARD.content_hash: YARD})
+    every = np.ones(len(samples), dtype=bool)
+    assert np.isnan(samples.impulse.at_points).all()  # the table tells none
+    found = {}
+    for off in (np.nan, -0.5, 0.5):
+        at_points = (samples.impulse.known + off).astype(np.float32)
+        owner = np.repeat(np.arange(len(samples)), samples.counts)
+        weights = samples.area_m2 * np.exp(samples.impulse.known)
+        mean = np.bincount(owner, weights) / np.bincount(owner, samples.area_m2)
+        told = replace(samples.impulse, target=np.log(mean), at_points=at_points)
+        learnt = fit(replace(samples, impulse=told), every, 60, 0, ABOUT, 1, peaks=False)
+        found[off] = load_errors(learnt, learnt.impulse, samples, told, every).bias
+    assert found[-0.5] < -0.1
+    assert found[0.5] > 0.1
+    (alone,) = (bias for off, bias in found.items() if np.isnan(off))
+    assert abs(alone) < 0.05
+
+
+def test_loads_at_points_of_a_table_are_those_of_its_structures() -> None:
+    table = table_of_guesses(by_hand(), 4)
+    first = table["structure"] == table["structure"].iloc[0]
+    few = table[first].assign(point_impulses_pa_s="[]", point_peaks_pa="[1.0,null]")
+    with pytest.raises(BlastEnvError, match="loads at 2 points, must have"):
+        Samples.of(few, {YARD.content_hash: YARD})
+    (count,) = {*Samples.of(table[first], {YARD.content_hash: YARD}).counts.tolist()}
+    loads = json.dumps([None, *range(count - 1)])
+    told = Samples.of(
+        few.assign(point_peaks_pa=[loads, *["[]"] * (len(few) - 1)]), {YARD.content_hash: YARD}
+    )
+    at_points = told.peak.at_points.reshape(len(few), count)
+    assert np.isnan(at_points[0, 0])
+    assert np.isnan(at_points[1:]).all()
+    least = [0.0, *np.log(np.arange(1, count - 1))]  # where no wave came, 1 Pa
+    assert at_points[0, 1:] == pytest.approx(np.array(least), abs=1e-6)
 
 
 def test_it_learns_from_messages_what_ways_do_not_see() -> None:

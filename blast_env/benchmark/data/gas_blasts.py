@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.errors import UnknownNameError, import_extra
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.tables import Column
 from blast_env.values import path_of
 
@@ -22,6 +22,7 @@ TABLES: Final = (
     "module_site_blasts",
     "liked_site_blasts",
     "further_site_blasts",
+    "point_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
@@ -45,6 +46,10 @@ COLUMNS: Final = (
     Column("peak_pa", "Pa", "largest overpressure on them"),
     Column("unprotected_impulse_pa_s", "Pa s", "the same blast without a barrier; else missing"),
     Column("unprotected_peak_pa", "Pa", "the same for the overpressure"),
+    Column(
+        "point_impulses_pa_s", "Pa s", "JSON: at the points of `WallPoints`; [] if unknown", True
+    ),
+    Column("point_peaks_pa", "Pa", "JSON: the largest overpressures there; [] if unknown", True),
     Column("engine", "", "engine with its version and fields", True),
 )
 """Columns of the set, with units."""
@@ -62,12 +67,12 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
     Test sites are never in the training split, also when data are added.
 
     Args:
-        name: `gas_blasts`: all tables that come with the package.
-        paths: Files of `python -m studies.blast_table` to read instead.
+        name: `gas_blasts`: all tables in `docs/data` of the repository.
+        paths: Some of these files, or of `python -m studies.blast_table`, to read instead.
 
     Raises:
         UnknownNameError: If there is no such set.
-        BlastEnvError: If a file cannot be read, or has other columns.
+        BlastEnvError: If a file cannot be read, or has other columns; as `sources`.
     """
     import pandas as pd
 
@@ -103,10 +108,17 @@ def split_of(scenario_hash: str) -> str:
 
 
 def sources() -> tuple[Path, ...]:
-    """Return the files that come with the package: inside it, or in the checkout beside it."""
-    package = Path(__file__).resolve().parent
-    installed = package / "tables"
-    folder = installed if installed.is_dir() else package.parents[2] / "docs" / "data"
+    """Return the files of the set in the checkout; an installed package has none.
+
+    Raises:
+        BlastEnvError: If there is no checkout around the package.
+    """
+    folder = Path(__file__).resolve().parents[3] / "docs" / "data"
+    if not folder.is_dir():
+        raise BlastEnvError(
+            "gas_blasts: its tables are in docs/data of the repository, not in the package; give "
+            "their paths: load('gas_blasts', paths)"
+        )
     return tuple(folder / f"{table}.parquet" for table in TABLES)
 
 
