@@ -57,15 +57,15 @@ def actions_for(actions: ActionNumbers, placement: LayoutState, element: Element
 
 
 def test_there_are_as_many_actions_as_items_and_places() -> None:
-    counts = [4 * 84, 4 * 84, 4 + 84, 4 + 2 + 48, 4 * 6, 9]
+    counts = [4 * 84, 4 * 84, 4 + 84, 4 + 2 + 48, 4 * 6, 2 * 9]
     assert [counted(name, yard()) for name in ACTIONS] == counts
     assert yard_env(action="item_then_place").action_space == gym.spaces.Discrete(4 + 84 + 1)
     zone = yard().zone.model_copy(update={"rows": 112, "columns": 43})
     large = yard().model_copy(update={"build_zone": zone})
-    counts = [4 * 4816, 4 * 4816, 4 + 4816, 4 + 14 * 6 + 64, 4 * 43, 9]
+    counts = [4 * 4816, 4 * 4816, 4 + 4816, 4 + 14 * 6 + 64, 4 * 43, 2 * 9]
     assert [counted(name, large) for name in ACTIONS] == counts
     # Without a catalogue there is no item to choose, and 8 x 5 cells are one block.
-    assert [counted(name, small_scenario()) for name in ACTIONS] == [40, 40, 40, 40, 5, 4]
+    assert [counted(name, small_scenario()) for name in ACTIONS] == [40, 40, 40, 40, 5, 2 * 4]
 
 
 @pytest.mark.parametrize("scenario", [yard(), glazed_yard(), small_scenario()])
