@@ -33,7 +33,7 @@ _ORIGINS: Final = {
     "module_site_blasts": "generated sites of single modules, and courts between buildings",
     "liked_site_blasts": "further sites, and layouts that a surrogate and an agent like",
     "further_site_blasts": "further kerbs, streets, courts and short fronts, and such layouts",
-    "point_site_blasts": "further ones of these kinds, with the loads at points of walls, too",
+    "later_site_blasts": "further ones of these kinds, most with loads at points of walls, too",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)

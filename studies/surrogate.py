@@ -56,7 +56,7 @@ from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet")
-    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further", "point")
+    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further")
 )
 """Data of the packaged surrogate: blasts on generated sites."""
 

@@ -22,7 +22,7 @@ TABLES: Final = (
     "module_site_blasts",
     "liked_site_blasts",
     "further_site_blasts",
-    "point_site_blasts",
+    "later_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
