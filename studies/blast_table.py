@@ -123,7 +123,8 @@ def _tables(source: Path, names: Mapping[str, "NamedSite"]) -> Iterator[pd.DataF
 
 def joined(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     """Return the rows of tables, each once: of equal ones that with loads at points, if any."""
-    rows = pd.concat([table for table in tables if len(table)], ignore_index=True)
+    filled = [table for table in tables if len(table)]
+    rows = pd.concat(filled or [table_of([], COLUMNS)], ignore_index=True)
     order = np.argsort((rows["point_impulses_pa_s"] == "[]").to_numpy(), kind="stable")
     once = rows.iloc[order].drop_duplicates([*BLAST, "structure"])
     return once.sort_index().reset_index(drop=True)

@@ -167,3 +167,4 @@ def test_tables_are_joined_and_rows_with_loads_at_points_win(tmp_path: Path) -> 
     assert found["layout"].tolist() == [WALL, "[]"]
     assert set(found["point_impulses_pa_s"]) == {"[1.0]"}
     assert run(tmp_path / "none", "--out", out)[0] == 2
+    assert blast_table.joined([table.iloc[:0] for table in tables]).empty
