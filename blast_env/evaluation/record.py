@@ -24,9 +24,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.validation import UNSTATED, Validation, worst_validation
 from blast_env.geometry import Layout, WallName
 from blast_env.response.levels import BayDamage, LevelOfProtection, level_of, worst
-from blast_env.site import AnyScenario, ObjectiveSection, Scenario, find_scenario
+from blast_env.site import AnyScenario, AnyStructure, ObjectiveSection, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
-from blast_env.site.facade import BayComponents
+from blast_env.site.facade import BayComponents, named_bays
 from blast_env.site.structures import StructureSection
 from blast_env.statistics import counted_parts, mean_over_area
 
@@ -351,12 +351,12 @@ def parts_digest(scenario: Scenario) -> str:
     panes and walls in the bays are no part of it, nor are measures that replace them: their
     response is computed from the histories.
     """
-    # Masses decide which pieces fall in a blast; names and divisions of facades decide what is
-    # recorded.
+    # Masses decide which pieces fall in a blast; names, divisions and bays of facades decide what
+    # is recorded.
     zone = scenario.build_zone
     items = [] if zone is None else [item.model_dump(mode="json") for item in zone.items]
     structures = [
-        (structure.name, structure.building_name, structure.facade and _division(structure.facade))
+        (structure.name, structure.building_name, _division(structure))
         for structure in scenario.structures
         if structure.building_name != structure.name or structure.facade is not None
     ]
@@ -365,8 +365,15 @@ def parts_digest(scenario: Scenario) -> str:
     return sha256(json.dumps((items, structures)).encode()).hexdigest()
 
 
-def _division(facade: Any) -> tuple[float | int | None, ...]:
-    return facade.storey_m, facade.storeys, facade.bay_m
+def _division(structure: AnyStructure) -> tuple[object, ...] | None:
+    facade = structure.facade
+    if facade is None:
+        return None
+    sizes = facade.storey_m, facade.storeys, facade.bay_m
+    # A polygon has no bay where nothing stands; all bays of a rectangle have a component.
+    if structure.footprint is None:
+        return sizes
+    return *sizes, [own.bay.name for own in named_bays(structure)]
 
 
 class WallsWithoutVerdict(NamedTuple):

@@ -539,3 +539,22 @@ def test_a_hardened_facade_responds_to_the_blast_of_the_other(
         hardened = consequences(known, (TAKEN,), [charge])
         pd.testing.assert_frame_equal(tables(hardened)[0], tables(fresh)[0])
         assert not tables(hardened)[0].equals(tables(plain)[0])
+
+
+def test_walls_of_a_polygon_that_get_windows_later_have_a_verdict_too(tmp_path: Path) -> None:
+    """The first blast had no bays on the west wall, so its record cannot answer for them."""
+    document = glazed_hut().model_dump(mode="json", exclude_none=True)
+    hut = document["structures"][0]
+    left, bottom, right, top = glazed_hut().structures[0].rectangle_m
+    corners = [[left, bottom], [right, bottom], [right, top], [left, top]]
+    parts = [{"walls": [wall], "glazing": "low"} for wall in ("east", "west")]
+    kept = {key: hut[key] for key in ("name", "protected", "height_m")}
+    polygon = kept | {"kind": "polygon", "outline_m": corners}
+
+    def walls(count: int) -> set[str]:
+        facade = {"bay_m": 1.0, "parts": parts[:count]}
+        site = document | {"structures": [polygon | {"facade": facade}]}
+        evaluator = on_gas(tmp_path, Scenario.from_document(site, "polygon"))
+        return set(tables(consequences(evaluator, (), [CHARGE]))[0]["wall"])
+
+    assert (walls(1), walls(2), walls(1)) == ({"east"}, {"east", "west"}, {"east"})
