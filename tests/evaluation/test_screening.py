@@ -126,6 +126,54 @@ def test_a_component_keeps_its_level_from_its_stand_off_on() -> None:
     assert levels[0] < LevelOfProtection.LOW <= levels[1]
 
 
+def test_the_stand_off_that_a_site_needs_is_that_of_its_own_panes_and_storeys() -> None:
+    """Panes wider than the component's and a storey higher than most are weaker."""
+    document = yard().model_dump(mode="json", exclude_none=True)
+    (office,) = document["structures"]
+    needed_m = {}
+    for name, changes, facade in (
+        ("as listed", {}, {"glazing": "window_annealed_6"}),
+        ("wide", {}, {"glazing": "window_annealed_6", "pane_width_m": 2.4}),
+        ("low storeys", {"height_m": 9.0}, {"wall": "brick_215", "storey_m": 3.0}),
+        ("a high one", {"height_m": 11.0}, {"wall": "brick_215", "storey_m": 3.0}),
+    ):
+        own = document | {"structures": [office | changes | {"facade": facade}]}
+        found = screen(Scenario.from_document(own, "yard"))
+        needed_m[name] = found.needed_m("5 kg", LOW)
+        # The table is of the sizes of the catalogue, and of the most frequent storey.
+        listed = next(own for own in found.stand_offs["5 kg"] if own.name in found.present)
+        assert (needed_m[name] > listed.distances_m[LOW.level]) is (name in ("wide", "a high one"))
+    assert needed_m["wide"] > 1.1 * needed_m["as listed"]
+    assert needed_m["a high one"] > 1.1 * needed_m["low storeys"]
+
+
+def test_bays_that_something_covers_in_part_are_named_and_those_of_party_walls_are_not() -> None:
+    document = yard().model_dump(mode="json", exclude_none=True)
+    document["structures"][0]["faces"] = ["west", "north"]
+    next_house = builders.block("next", 29.0, 14.0, 24, 2, height_m=4.0)
+    balcony = next_house | {"name": "balcony", "base_m": 1.5, "height_m": 2.0}
+    named = {}
+    for name, other in (("balcony", balcony), ("next house", next_house)):
+        site = Scenario.from_document(
+            document | {"structures": [*document["structures"], other]}, "yard"
+        )
+        found = screen(site, (), (), packaged_laws())
+        assert {bay.filled.bay.wall for bay in found.threats[0].bays} == {"north"}
+        parts = screening_answer(site, (), found, [LOW])
+        flags = [part.text() for part in parts if isinstance(part, Line) and part.kind == "flag"]
+        named[name] = [flag for flag in flags if "left out" in flag]
+    assert named["next house"] == []
+    (flag,) = named["balcony"]
+    assert flag.startswith("4 bays left out, before whose middle a structure or a piece stands")
+    assert "office/west/1/1, office/west/1/2, office/west/1/3, ..." in flag
+    document["structures"][0]["faces"] = ["west"]
+    covered = Scenario.from_document(
+        document | {"structures": [*document["structures"], balcony]}, "yard"
+    )
+    with pytest.raises(BlastEnvError, match=r"'hut'.*office/west/1/1.*no bay can be screened"):
+        screen(covered)
+
+
 def test_a_charge_above_the_ground_near_a_wall_says_that_gas_may_have_more() -> None:
     """20 kg 5 m from a wall: 1.8 m/kg^(1/3); at 12 m 4.4, on the ground screening is the larger."""
     for away_m, up_m, may_be_low in ((5.0, 0.2, True), (5.0, 0.0, False), (12.0, 0.2, False)):

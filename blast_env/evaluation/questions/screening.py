@@ -71,6 +71,7 @@ BEHIND_LOW_BY: Final = 1.48
 _APART_M: Final = 2.0
 _MOST_PLACES: Final = 300
 _POINTS: Final = 14  # of a table of damage, along each axis
+_SHARES: Final = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of the width and the height of a bay
 _DISTANCES: Final = 400  # of stand-offs, each 0.8 % farther than the last
 
 
@@ -201,14 +202,19 @@ class Screening:
         threats: The threats at their worst places.
         components: The components of the site and the catalogue, by name.
         present: Names of the components in the site's bays.
+        parts: The panes and panels of the site's bays, each once, of the sizes that they have.
         storey_m: The most frequent height of a storey, the span of walls.
+        covered: Names of the bays before whose middle a structure or a piece stands; they are in no
+            threat. Those that touch another building with all of their area are not named.
         knows_surroundings: Whether the atlas changed the loads.
     """
 
     threats: tuple[ThreatScreening, ...]
     components: Mapping[str, Glazing | Wall]
     present: frozenset[str]
+    parts: tuple[Pane | Panel, ...]
     storey_m: float
+    covered: tuple[str, ...] = ()
     knows_surroundings: bool = True
 
     @property
@@ -225,23 +231,28 @@ class Screening:
         }
 
     def needed_m(self, threat: str, requirement: Requirement) -> float:
-        """Return the stand-off at which all components of the site keep a requirement."""
-        found = next(part for part in self.threats if part.name == threat)
+        """Return the stand-off at which all components of the site keep a requirement.
+
+        Their panes and spans are as large as those of the site, not as in `stand_offs`.
+        """
+        curves = self._curves[threat]
         # The farthest of all: every component of the site, then limits of peak and impulse.
         own = [
-            stand_off.distances_m[requirement.level]
-            for stand_off in self.stand_offs[threat]
-            if requirement.level in stand_off.distances_m
-            and stand_off.name in self.present
-            and not (requirement.glass_only and isinstance(stand_off.component, Wall))
+            curves.stand_offs_m(part)[requirement.level]
+            for part in self.parts
+            if requirement.level in _LEVELS
+            and not (requirement.glass_only and isinstance(part, Panel))
         ]
-        curves = _Curves(found.charge)
         own += [
             curves.reach_m(index, limit)
             for index, limit in ((1, requirement.peak_pa), (2, requirement.impulse_pa_s))
             if np.isfinite(limit)
         ]
         return max(own, default=0.0)
+
+    @cached_property
+    def _curves(self) -> Mapping[str, "_Curves"]:
+        return {threat.name: _Curves(threat.charge) for threat in self.threats}
 
 
 def screen(
@@ -271,6 +282,11 @@ def screen(
             " [structures.facade], or give --glazing or --wall"
         )
     facade = _Facade.of(scenario, layout, bays)
+    if not facade.bays:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r}: a structure or a piece of the layout stands before the"
+            f" middle of each bay ({facade.covered[0]} and so on): no bay can be screened"
+        )
     changed = None if atlas is None else SiteAtlas(facade.site, facade.walls, atlas)
     screened = []
     known_places: dict[object, Ways] = {}  # threats that differ in mass alone share them
@@ -288,7 +304,9 @@ def screen(
         frozenset(
             name for named_bay in named_bays for name in (named_bay.glazing, named_bay.wall) if name
         ),
+        _parts_of(bays),
         max(set(storeys), key=storeys.count),
+        facade.covered,
         atlas is not None,
     )
 
@@ -329,11 +347,19 @@ def likely_impulses(
     return dict(zip(names, np.stack(found, axis=1), strict=True))
 
 
+def _parts_of(bays: Iterable[FacadeBay]) -> tuple[Pane | Panel, ...]:
+    """Return the panes and panels of bays, each once."""
+    panes = dict.fromkeys(own.glazing for own in bays if own.glazing is not None)
+    spans = ((own.wall, round(own.bay.height_m, 6)) for own in bays if own.wall is not None)
+    return (*map(pane_of, panes), *(panel_of(*own) for own in dict.fromkeys(spans)))
+
+
 class _Curves:
     """Kingery and Bulmash's loads of one charge in the open."""
 
     def __init__(self, charge: Charge) -> None:
         self._charge = charge
+        self._known: dict[Pane | Panel, dict[LevelOfProtection, float]] = {}
         scale = float(np.cbrt(charge.tnt_kg))
         is_raised = charge.height_m > 0.0
         self.least_m = (RAISED_SCALED_M if is_raised else CHECKED_SCALED_DISTANCE[0]) * scale
@@ -349,6 +375,11 @@ class _Curves:
 
     def stand_offs_m(self, part: Pane | Panel) -> dict[LevelOfProtection, float]:
         """Return the least of the distances at which a part allows each level."""
+        if part not in self._known:
+            self._known[part] = self._found_m(part)
+        return self._known[part]
+
+    def _found_m(self, part: Pane | Panel) -> dict[LevelOfProtection, float]:
         distances_m, *loads = self.reflected
         # Damage falls with distance, so the first distance that keeps a level is found by
         # bisection, of all levels at once.
@@ -383,6 +414,8 @@ class _Facade:
         ends_m: Distances of the middles from the ends of the wall on the right and on the left
             (bays, 2).
         site: The site with a charge that does not count.
+        covered: Names of the bays that are left out because a structure or a piece covers their
+            middle, without those that structures cover wholly.
     """
 
     bays: tuple[FacadeBay, ...]
@@ -390,6 +423,7 @@ class _Facade:
     outward: FloatArray
     ends_m: FloatArray
     site: BlastSite
+    covered: tuple[str, ...]
 
     @classmethod
     def of(
@@ -402,7 +436,10 @@ class _Facade:
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
         free = ~_covered(site, before_m)
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
-        return cls(kept, before_m[free], normals[free], _ends_m(bays, normals)[free], site)
+        hidden = ~free & ~_wholly_covered(site, bays, before_m, normals)
+        covered = tuple(bays[index].bay.name for index in np.flatnonzero(hidden).tolist())
+        ends_m = _ends_m(bays, normals)[free]
+        return cls(kept, before_m[free], normals[free], ends_m, site, covered)
 
     @property
     def walls(self) -> Walls:
@@ -484,6 +521,27 @@ def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
         low, high = np.array([left, bottom, block.base_m]), np.array([right, top, high_m])
         covered |= ((points_m > low) & (points_m < high)).all(axis=1)
     return covered
+
+
+def _wholly_covered(
+    site: BlastSite, bays: Sequence[FacadeBay], before_m: FloatArray, outward: FloatArray
+) -> BoolArray:
+    """Return whether structures cover all of each bay, as a building that it touches does (bays,).
+
+    Args:
+        before_m: Places before the middles of the bays (bays, 3).
+        outward: Their outward normals (bays, 3).
+    """
+    built = tuple(outline for outline in site.structures if not outline.is_barrier)
+    alone = replace(site, structures=built)
+    wide_m, high_m = np.array([(own.bay.width_m, own.bay.height_m) for own in bays]).T
+    along = np.column_stack([-outward[:, 1], outward[:, 0], outward[:, 2]])
+    whole = np.ones(len(bays), dtype=bool)
+    for across, up in product(_SHARES, repeat=2):
+        points_m = before_m + (across * wide_m)[:, np.newaxis] * along
+        points_m[:, 2] += up * high_m
+        whole &= _covered(alone, points_m)
+    return whole
 
 
 def _by_threat(scenario: Scenario, named: Sequence[MassPreset]) -> dict[str, tuple[AnySource, ...]]:
