@@ -40,7 +40,7 @@ class ScoreReference:
 
     Attributes:
         digest: Digest of the problem's definition.
-        engine: The engine that judged the shares, with its version: `gas 7`.
+        engine: The engine that judged the shares, with its version: `gas 8`.
         rules: Share of the load that remains with each rule, with cells of 0.5 m, by name.
         rule: The best of the rules: score 0.
         best: The best known layout: score 1.

@@ -380,8 +380,8 @@ class WallsWithoutVerdict(NamedTuple):
     """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
 
     Attributes:
-        area_m2: Area of these walls that touches air, m2.
-        of_m2: Area of all counted walls of the building that touches air, m2.
+        area_m2: Area of these walls that touches air or pieces, m2.
+        of_m2: Area of all counted walls of the building that touches air or pieces, m2.
         structures: The parts of the building with such walls.
     """
 

@@ -22,7 +22,7 @@ from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
 from blast_env.gas.cost import cost_of_run
 from blast_env.gas.enclosure import room_around
 from blast_env.gas.ending import AREA, corners_m, is_known, limit_s, sound_s, watched_structures
-from blast_env.gas.faces import Faces, exposed_faces
+from blast_env.gas.faces import Faces, exposed_faces, leaning_faces
 from blast_env.gas.grid import GasGrid, layers_to
 from blast_env.gas.probes import FaceLoads, Gauges
 from blast_env.gas.settings import FACE_NAMES, GasSettings, cells_unchecked
@@ -60,10 +60,10 @@ def _none(_: GasGrid) -> Sequence[Recorder]:
 
 @dataclass(frozen=True, eq=False)
 class FaceTable:
-    """The cell faces of structures and barrier.
+    """The cell faces of structures and barrier; see `face_table_of` for those behind pieces.
 
     Attributes:
-        faces: The faces for the solver (n,).
+        faces: The faces for the solver, on which the loads act (n,).
         structure: Index into the site's structures (n,).
         row: Row of the module in its structure (n,).
         column: Column of the module (n,).
@@ -152,7 +152,7 @@ class GasRun:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
         self.end_reason: EndReason | None = None
         # 5. When the run may end.
-        self._groups = _groups(self.table, self.grid, site, settings.until, watched)
+        self._groups = _groups(self.table, site, settings.until, watched)
         self._watches_gauges = settings.until == "gauges" and self.gauges is not None
         places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []
         self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
@@ -203,7 +203,7 @@ class GasRun:
 
         With `until` of "walls", all its faces are included.
         """
-        groups = _groups(self.table, self.grid, self.site, self.settings.until, [index])
+        groups = _groups(self.table, self.site, self.settings.until, [index])
         return not groups or (self.has_come(index) and self._are_known(groups))
 
     @property
@@ -323,9 +323,18 @@ def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
 
 
 def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
-    """Return the cell faces of the structures and the barrier of a site."""
-    faces = exposed_faces(grid, grid.solid)
-    behind = tuple(faces.solid.T)
+    """Return the cell faces of the structures and the barrier of a site.
+
+    A part of a wall that pieces of the barrier lean on touches no air. What pushes a piece pushes
+    the wall behind it, so that part has the load of the outer face of the pieces before it.
+    """
+    # 1. Faces that touch air, and those of walls behind pieces.
+    exposed = exposed_faces(grid, grid.solid)
+    leaning, walls = leaning_faces(grid, _barrier_cells(grid, site))
+    faces = exposed.followed_by(leaning)
+    cells = np.concatenate((exposed.solid, walls))
+    # 2. Their structures and modules.
+    behind = tuple(cells.T)
     z_m = grid.centres_m(2)[behind[2]]
     structure, row, column = np.full((3, len(faces)), -1)
     for index, outline in enumerate(site.structures):
@@ -339,7 +348,8 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
         own = here[inside]
         structure[own] = index
         row[own], column[own] = of_row[inside], of_column[inside]
-    # West, east, south, north by axis and side; upward faces are roofs, downward ones undersides.
+    # 3. West, east, south, north by axis and side; upward faces are roofs, downward ones
+    # undersides.
     upright = 2 * faces.axis + (faces.side > 0)
     face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
     table = FaceTable(
@@ -353,82 +363,48 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
         share=np.ones(len(faces)),
         outward=np.array([*OUTWARDS.values(), (0.0, 0.0), (0.0, 0.0)])[face],
     )
+    # 4. The walls of polygons, from the places on them.
+    places_m = faces.of_cells(cells).centres_m(grid)[:, :2]
     for index, outline in enumerate(site.structures):
         if outline.footprint is not None:
-            _assign_walls(table, index, outline.footprint)
+            _assign_walls(table, index, outline.footprint, places_m)
     return table
 
 
-def _assign_walls(table: FaceTable, index: int, footprint: "Footprint") -> None:
+def _barrier_cells(grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
+    """Return the cells that the barrier fills (nx, ny, nz)."""
+    cells = np.zeros(grid.shape, dtype=bool)
+    for outline in site.structures:
+        if outline.is_barrier:
+            cells |= _cells_of(outline, grid, site)
+    return cells
+
+
+def _assign_walls(
+    table: FaceTable, index: int, footprint: "Footprint", places_m: FloatArray
+) -> None:
     """Assign the upright faces of a structure to the walls of its polygon."""
     own = np.flatnonzero((table.structure == index) & (table.face < len(WALLS)))
-    places_m = table.centre_m[own, :2]
-    table.wall[own], table.share[own] = footprint.walls_of(places_m, table.outward[own])
+    table.wall[own], table.share[own] = footprint.walls_of(places_m[own], table.outward[own])
     sides = np.array([WALLS.index(wall.side) for wall in footprint.walls])
     table.face[own] = sides[table.wall[own]]
     table.outward[own] = np.array([wall.normal for wall in footprint.walls])[table.wall[own]]
 
 
-def counted_faces(
-    table: FaceTable, grid: GasGrid, site: BlastSite, index: int
-) -> NDArray[np.int64]:
+def counted_faces(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64]:
     """Return the indices of the faces on which the load on a structure is assessed (n,).
-
-    They are those of its counted walls that touch air. Where pieces of the barrier hide all of
-    them, the faces of the pieces that lean on these walls take their place: what pushes a piece
-    pushes the wall behind it.
 
     Args:
         table: The faces.
-        grid: The grid.
         site: The site.
         index: Index of the structure in the site.
     """
-    outline = site.structures[index]
-    counting = [FACE_NAMES.index(name) for name in outline.faces]
-    own = np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
-    if len(own) or outline.footprint is not None:
-        return own
-    barriers = [k for k, other in enumerate(site.structures) if other.is_barrier]
-    of_pieces = np.isin(table.structure, barriers)
-    leaning = [
-        _leaning_faces(table, grid, outline, np.flatnonzero(of_pieces & (table.face == face)), face)
-        for face in counting
-    ]
-    return np.concatenate(leaning) if leaning else own
-
-
-def _leaning_faces(
-    table: FaceTable,
-    grid: GasGrid,
-    outline: StructureOutline,
-    faces: NDArray[np.int64],
-    wall: int,
-) -> NDArray[np.int64]:
-    """Return those of some faces between which and a wall, an index of `WALLS`, all is solid."""
-    # 1. Faces before the wall, at most as high and as wide as it.
-    axis, is_high = divmod(wall, 2)
-    box, side = outline.rectangle_m, 1 if is_high else -1
-    wall_m = (box.left, box.right, box.bottom, box.top)[wall]
-    low_m, high_m = ((box.bottom, box.top), (box.left, box.right))[axis]
-    centre_m = table.centre_m[faces]
-    away_m = side * (centre_m[:, axis] - wall_m)
-    along_m, z_m = centre_m[:, 1 - axis], centre_m[:, 2]
-    is_before = (away_m > 0.0) & (along_m > low_m) & (along_m < high_m)
-    is_before &= (z_m > outline.base_m) & (z_m < (outline.height_m or np.inf))
-    # 2. Of these, those with solid cells all the way to the wall.
-    found, cells = [], np.round(away_m / grid.cell_m).astype(int)
-    for number in np.flatnonzero(is_before).tolist():
-        solid = [*table.faces.solid[faces[number]]]
-        between = np.arange(cells[number])
-        solid[axis] = solid[axis] - side * between
-        if grid.solid[tuple(solid)].all():
-            found.append(faces[number])
-    return np.array(found, dtype=np.int64)
+    counting = [FACE_NAMES.index(name) for name in site.structures[index].faces]
+    return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
 
 
 def _groups(
-    table: FaceTable, grid: GasGrid, site: BlastSite, until: str | float, watched: Sequence[int]
+    table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:
     """Return the faces of each wall that a run waits for: counted walls, or all of them."""
     groups = [
@@ -436,8 +412,6 @@ def _groups(
         for index in watched
         for name in (FACE_NAMES if until == "walls" else site.structures[index].faces)
     ]
-    # Pieces may lean on all counted walls; else these are the same faces once more.
-    groups += [counted_faces(table, grid, site, index) for index in watched]
     return [members for members in groups if len(members)]
 
 

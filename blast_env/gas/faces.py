@@ -34,6 +34,20 @@ class Faces:
         solid[np.arange(len(self)), self.axis] -= self.side
         return solid
 
+    def followed_by(self, others: "Faces") -> "Faces":
+        """Return these faces and then others."""
+        pairs = zip(
+            (self.air, self.axis, self.side), (others.air, others.axis, others.side), strict=True
+        )
+        air, axis, side = (np.concatenate(pair) for pair in pairs)
+        return Faces(air, axis, side)
+
+    def of_cells(self, cells: NDArray[np.int64]) -> "Faces":
+        """Return faces of other cells (n, 3), turned as these."""
+        beside = cells.copy()
+        beside[np.arange(len(self)), self.axis] += self.side
+        return Faces(beside, self.axis, self.side)
+
     def centres_m(self, grid: GasGrid) -> NDArray[np.float64]:
         """Return the centres of the faces (n, 3)."""
         middle = 0.5 * (self.air + self.solid) + 0.5
@@ -100,6 +114,39 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
             axes.append(np.full(len(neighbour), axis))
             sides.append(np.full(len(neighbour), side))
     return Faces(np.concatenate(air), np.concatenate(axes), np.concatenate(sides))
+
+
+def leaning_faces(grid: GasGrid, pieces: NDArray[np.bool_]) -> tuple[Faces, NDArray[np.int64]]:
+    """Return the outer faces of pieces that lean on upright walls, and the cells of these walls.
+
+    A cell of a wall without air before all pieces, as between two buildings, has no face.
+
+    Args:
+        grid: The grid.
+        pieces: Mask of the cells of pieces (nx, ny, nz); other solid cells are walls.
+
+    Returns:
+        The faces; the cell of the wall behind each of them (n, 3).
+    """
+    # Nothing stands outside the grid, and no load is known there.
+    piece, wall, air = (np.pad(mask, 1) for mask in (pieces, grid.solid & ~pieces, ~grid.solid))
+    faces, cells = NO_FACES, NO_FACES.air
+    for axis in range(2):
+        for side in (-1, 1):
+            # 1. Cells of walls before which a piece stands.
+            behind = np.argwhere(wall & np.roll(piece, -side, axis))
+            # 2. From there outwards, through pieces, to the first other cell.
+            beyond = behind.copy()
+            is_before = np.ones(len(beyond), dtype=bool)
+            while is_before.any():
+                beyond[is_before, axis] += side
+                is_before &= piece[tuple(beyond.T)]
+            # 3. If that is air, the piece before it hands its load on.
+            is_loaded = air[tuple(beyond.T)]
+            count = int(is_loaded.sum())
+            loaded = Faces(beyond[is_loaded] - 1, np.full(count, axis), np.full(count, side))
+            faces, cells = faces.followed_by(loaded), np.vstack((cells, behind[is_loaded] - 1))
+    return faces, cells
 
 
 def ground_faces(grid: GasGrid) -> Faces:

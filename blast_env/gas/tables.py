@@ -53,13 +53,13 @@ MODULE_COLUMNS: Final = (
     *_LOADS,
     Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
 )
-"""One row per module face that touches air."""
+"""One row per module face that touches air, or a piece that leans on it."""
 
 WALL_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
     Column("face", "", "west, east, south, north, roof or underside"),
     Column("counts", "", "whether its load counts, if the structure is protected"),
-    Column("area_m2", "m2", "its area that touches air"),
+    Column("area_m2", "m2", "its area that touches air or pieces"),
     *_LOADS,
 )
 """One row per wall or roof of a structure, without the barrier."""
@@ -161,7 +161,7 @@ def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataF
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row per module face that touches air; see `MODULE_COLUMNS`.
+    """Return one row per module face; see `MODULE_COLUMNS`.
 
     Args:
         faces: Its `face_table`.

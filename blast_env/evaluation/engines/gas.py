@@ -109,7 +109,7 @@ class GasEngine(GasSettings, Engine):
     medium: ClassVar[Literal["", "gas", "particles"]] = "gas"
 
     name: str = "gas"
-    version: str = f"gas 7 (numba {version('numba')})"
+    version: str = f"gas 8 (numba {version('numba')})"
 
     def blast(
         self,
@@ -318,7 +318,7 @@ class GasResult:
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
-        """One row per module face that touches air; see `MODULE_COLUMNS`."""
+        """One row per module face; see `MODULE_COLUMNS`."""
         return module_table(self.run, self.faces)
 
     @cached_property
@@ -508,7 +508,7 @@ class GasResult:
         """Return the indices of the faces on which the load on a structure is assessed (n,)."""
         from blast_env.gas.engine import counted_faces  # Numba takes half a second to import
 
-        return counted_faces(self.run.table, self.run.grid, self.run.site, index)
+        return counted_faces(self.run.table, self.run.site, index)
 
     @cached_property
     def _peak_pa(self) -> FloatArray:

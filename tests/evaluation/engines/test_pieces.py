@@ -1,18 +1,22 @@
 """Pieces of a barrier under a blast: they are pushed by what their sides took, and move by it."""
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import blast_env
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import StructureLoad
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.geometry import Piece
-from blast_env.site import Charge
+from blast_env.layout import LayoutState
+from blast_env.site import Charge, Scenario
 from tests import builders
-from tests.builders import block, point
+from tests.builders import Document, block, point
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES
 from tests.gas_sites import hut, net_on_modules
@@ -93,20 +97,47 @@ def test_modules_are_pieces_and_walls_as_high_as_the_air_are_none() -> None:
         endless.piece_history("x4.250_y2.750")
 
 
-def front_behind(layout: list[Piece]) -> StructureLoad:
-    """Return the load on a front of 4 m behind walls, which in the second column lean on it."""
-    wall = {"name": "wall", "length_modules": 4, "height_m": 3.0, "cost": 1.0, "stock": 3}
-    zone = builders.zone(5.0, 2.0, 8, 2, items=[wall])
-    front = block("front", 6.0, 2.0, 8, 4, height_m=3.0, protected=True, faces=["west"])
-    site = builders.site("leaning", (9.0, 8.0, 6.0), point(1.0, 4.0, 60.0), front, build_zone=zone)
-    (load,) = GasEngine().loads(site, layout, Charge((1.0, 4.0), 60.0), 0).structures
-    return load
+def lane(*others: Document, outline: bool = False) -> Scenario:
+    """Return a front of 4 m, a zone of 1 m before it, walls of 2 m, and other structures.
+
+    `outline` makes the front a polygon.
+    """
+    items = [
+        {"name": f"{name}wall", "length_modules": 4, "height_m": height_m, "cost": 1.0, "stock": 3}
+        for name, height_m in (("", 3.0), ("low_", 1.5))
+    ]
+    zone = builders.zone(5.0, 2.0, 8, 2, items=items)
+    keys = {"height_m": 3.0, "protected": True}
+    front = block("front", 6.0, 2.0, 8, 4, **keys, faces=["west"])
+    if outline:
+        corners = [[6.0, 2.0], [8.0, 2.0], [8.0, 6.0], [6.0, 6.0]]
+        front = {
+            "kind": "polygon",
+            "name": "front",
+            "outline_m": corners,
+            **keys,
+            "faces": ["west"],
+        }
+    where = (9.0, 8.0, 6.0), point(1.0, 4.0, 60.0)
+    return builders.site("leaning", *where, front, *others, build_zone=zone)
+
+
+def blasted(site: Scenario, *layout: Piece) -> GasResult:
+    return GasEngine().blast(site, layout, 0, Charge((1.0, 4.0), 60.0)).run()
+
+
+def on_front(result: GasResult) -> StructureLoad:
+    return next(load for load in result.structure_loads if load.name == "front")
+
+
+def upright(row: int, column: int, name: str = "wall") -> Piece:
+    return Piece(row, column, name, True)
 
 
 def test_walls_that_lean_on_a_whole_front_hand_their_load_to_it() -> None:
     """No face of the front touches air then; the walls stand 0.5 m nearer to the charge."""
     bare, before, leaning = (
-        front_behind([Piece(row, column, "wall", True) for row in rows])
+        on_front(blasted(lane(), *(upright(row, column) for row in rows)))
         for rows, column in (((), 0), ((0, 4), 0), ((0, 4), 1))
     )
     assert leaning.area_m2 == bare.area_m2 == before.area_m2 == 12.0
@@ -115,3 +146,50 @@ def test_walls_that_lean_on_a_whole_front_hand_their_load_to_it() -> None:
     assert bare.peak_pa is not None
     assert leaning.peak_pa > bare.peak_pa
     assert before.impulse_pa_s < 0.8 * bare.impulse_pa_s  # with air behind them they protect
+
+
+@pytest.mark.parametrize("outline", [False, True])
+def test_what_leans_on_a_part_of_a_front_hands_its_load_to_that_part(outline: bool) -> None:
+    """A low wall on the half of a front leaves no part of it out of the mean."""
+    site = lane(outline=outline)
+    bare, leaning = on_front(blasted(site)), blasted(site, upright(0, 1, "low_wall"))
+    on_it = on_front(leaning)
+    assert on_it.area_m2 == bare.area_m2 == 12.0
+    # The half of the height of a half of the width.
+    west = leaning.faces[leaning.faces["face"] == "west"]
+    of_wall, of_front = (
+        west[(west["structure"] == name) & (west["y_m"] < 4.0) & (west["z_m"] < 1.5)]
+        for name in ("barrier", "front")
+    )
+    assert len(of_front) == len(of_wall) == 12
+    handed = of_front.sort_values(["y_m", "z_m"])["impulse_pa_s"].tolist()
+    assert handed == of_wall.sort_values(["y_m", "z_m"])["impulse_pa_s"].tolist()
+    assert on_it.impulse_pa_s == pytest.approx(bare.impulse_pa_s, rel=0.05)
+
+
+def test_pieces_hand_on_what_pieces_before_them_take() -> None:
+    """Two walls, one behind the other, are as good as solid."""
+    result = blasted(lane(), upright(0, 0), upright(0, 1))
+    west = result.faces[result.faces["face"] == "west"]
+    front, pieces = (west[west["structure"] == name] for name in ("front", "barrier"))
+    hidden = front[front["y_m"] < 4.0]
+    assert hidden["x_m"].unique().tolist() == [5.0]
+    assert hidden["impulse_pa_s"].mean() == pytest.approx(pieces["impulse_pa_s"].mean(), rel=1e-6)
+
+
+def test_what_stands_between_two_buildings_hands_on_nothing() -> None:
+    """There is no air before the wall: as if the two buildings touched."""
+    other = block("other", 4.5, 2.0, 4, 2, height_m=3.0)
+    load = on_front(blasted(lane(other), upright(0, 1)))
+    assert load.area_m2 == 6.0
+
+
+@given(st.lists(st.sampled_from([upright(row, column) for row in (0, 2, 4) for column in (0, 1)])))
+@settings(max_examples=8)
+def test_no_layout_makes_the_front_smaller(layout: list[Piece]) -> None:
+    site, standing = lane(), LayoutState.empty(lane())
+    for piece in layout:
+        with suppress(LayoutError):
+            standing = standing.place(piece)
+    begun = GasEngine(until=1e-4).blast(site, standing.layout, 0).run()
+    assert on_front(begun).area_m2 == 12.0
