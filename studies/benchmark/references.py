@@ -121,9 +121,13 @@ def with_judged(
 def rescaled(
     judged: SubmissionJudgement, known: Mapping[str, ScoreReference]
 ) -> SubmissionJudgement:
-    """Return a judged submission with the best known shares of new references."""
+    """Return a judged submission with the shares of new references: best rule, best known."""
     key = cell_key(judged.cell_m)
-    runs = (replace(run, best=known[run.problem].best.shares[key]) for run in judged.runs)
+    runs = (
+        replace(run, rule=reference.rule.shares[key], best=reference.best.shares[key])
+        for run in judged.runs
+        for reference in [known[run.problem]]
+    )
     return replace(judged, runs=tuple(runs))
 
 

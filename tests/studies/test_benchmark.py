@@ -13,6 +13,7 @@ from blast_env.benchmark import (
     SubmissionJudgement,
     make,
     play,
+    shipped_standings,
     stored_references,
 )
 from blast_env.benchmark.problem import shares_of
@@ -39,6 +40,14 @@ def test_in_every_problem_the_best_known_layout_is_five_points_ahead() -> None:
     rows = [line.strip("| ").split(" | ") for line in result.stdout.splitlines()[2:]]
     assert {row[0].strip("`") for row in rows} == {*DEFINITIONS}
     assert all(float(row[-3]) >= 5.0 for row in rows)
+
+
+def test_runs_of_the_standings_are_beside_the_references_of_today() -> None:
+    known = stored_references()
+    for entry in shipped_standings():
+        for run in entry.runs:
+            shares = known[run.problem].rule.shares["0.25"], known[run.problem].best.shares["0.25"]
+            assert (run.rule, run.best) == shares, (entry.method, run.problem)
 
 
 def test_a_finder_takes_off_five_points_more_than_the_rule_with_blasts() -> None:
