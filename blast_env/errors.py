@@ -8,6 +8,8 @@ from datetime import date, datetime, time
 from difflib import get_close_matches
 from typing import Final
 
+import numpy as np
+
 
 class BlastEnvError(ValueError):
     """Base class: an input of the user is not usable."""
@@ -154,7 +156,9 @@ def key_path(parts: Sequence[str | int]) -> str:
 
 
 def value_text(value: object) -> str:
-    """Return a value as in a file, shortened."""
+    """Return a value as in a file, shortened; a number of NumPy as the number."""
+    if isinstance(value, np.generic):
+        return value_text(value.item())
     if isinstance(value, str):
         return quoted(value)
     if isinstance(value, bool):

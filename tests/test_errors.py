@@ -1,5 +1,6 @@
 """Texts of users and files in messages."""
 
+import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -23,6 +24,11 @@ def test_no_name_value_or_key_is_longer_than_a_quoted_text(text: str) -> None:
     for shown in (named(text), value_text(text), key_path([text])):
         assert len(shown) <= MAX_TEXT
         assert shown.isprintable()
+
+
+def test_numbers_of_numpy_are_shown_as_numbers() -> None:
+    values = (np.int64(7), np.float32(0.5), np.bool_(True), np.str_("a"))
+    assert [value_text(value) for value in values] == ["7", "0.5", "true", "'a'"]
 
 
 def test_a_single_word_needs_no_quotes() -> None:

@@ -22,7 +22,15 @@ from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.record import BlastLoads, StructureLoad
 from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState, charge_against
-from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleCharge, VehicleSource
+from blast_env.site import (
+    AnyCharge,
+    AnyScenario,
+    ObjectiveSection,
+    Scenario,
+    VehicleCharge,
+    VehicleSource,
+    find_scenario,
+)
 from blast_env.site.blast_site import Charge
 from blast_env.sites.criterion import places_of
 
@@ -114,17 +122,17 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):  # type: ignore[misc]  # unt
         cache: str | Path | BlastStore | None = None,
     ) -> None:
         super().__init__()
-        # The defender places in the environment itself, whose engine runs no blast: the game sets
-        # off the charge that the attacker chose.
+        self.scenario = find_scenario(scenario)
+        # The defender places in the environment itself, whose engine runs no blast, and so knows no
+        # response: the game sets off the charge that the attacker chose.
         self.placing = BlastBarrierEnv(
-            scenario,
+            self.scenario.model_copy(update={"objective": ObjectiveSection()}),
             observation="features",
             action="place",
             threat="hidden",
             threats=1,
             engine=_NoBlast(),
         )
-        self.scenario = self.placing.task.source.representative
         self.evaluator = BlastEvaluator(self.scenario, engine, cache=cache)
         self.charges = _charges(self.scenario)
         self.possible_agents = [DEFENDER, ATTACKER]

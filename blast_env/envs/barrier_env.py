@@ -32,7 +32,6 @@ from blast_env.envs.strategies import (
     find_threat_model,
     scenario_source,
 )
-from blast_env.errors import value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.evaluation.evaluator import BlastStore
 from blast_env.geometry import Element
@@ -256,9 +255,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
 
     def _check(self, action: np.int64 | int | Sequence[int] | IntArray) -> None:
         if not self.action_space.contains(action):
-            raise gym.error.InvalidAction(
-                f"action is {value_text(action)}, must be in {self.action_space}"
-            )
+            raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
         if self._episode.ended:
             raise gym.error.ResetNeeded("the episode has ended: call reset")
 

@@ -405,31 +405,22 @@ class Episodes:
             ScenarioError: If the charge of the options is not clear of a structure or the border.
             BlastEnvError: If the scenario has another size than the representative one.
         """
-        # Episodes on a site that begin empty are begun together.
-        is_empty = isinstance(options.layout, Sequence) and not options.layout
-        begins_as_site = is_empty and not options.fix_charge  # another type is refused by name
-        on_sites: dict[int, tuple[_Site, list[int]]] = {}
-        begun = []
+        # 1. All are drawn first: what is refused leaves every episode as it was.
+        begun: dict[int, Episode] = {}
+        together: dict[int, tuple[_Site, LayoutState, list[int]]] = {}
         for index, rng in zip(indices, rngs, strict=True):
-            site, charges, seeds = self._drawn(rng, options)
-            if begins_as_site:
-                start = site.empty
-                on_sites.setdefault(id(site), (site, []))[1].append(index)
-            else:
-                scenario = site.empty.scenario
-                if options.fix_charge:
-                    scenario = scenario.with_possible_charges(charges)
-                start = LayoutState.of(scenario, options.layout)
-                self.layouts.begin([index], PlacementRules.of(start), start)
-            shown = site.shown_of(self.task, charges)
-            begun.append(Episode(self.task, site, shown, seeds, start.checked))
-        for site, own in on_sites.values():
-            self.layouts.begin(own, site.rules, site.empty)
-        for index, episode in zip(indices, begun, strict=True):
+            start, episode = self._drawn(rng, options)
+            begun[index] = episode
+            together.setdefault(id(start), (episode.site, start, []))[2].append(index)
+        # 2. Those that begin with the empty layout of their site are begun together.
+        for index, episode in begun.items():
             if index == len(self.running):
                 self.running.append(episode)
             self.running[index] = episode
             self._without_effect.pop(index, None)
+        for site, start, own in together.values():
+            rules = site.rules if start is site.empty else PlacementRules.of(start)
+            self.layouts.begin(own, rules, start)
         rows = self._rows(indices)
         self.ended[rows], self._turns_made[rows], self.terms[rows] = False, 0, 0.0
 
@@ -439,20 +430,29 @@ class Episodes:
 
     def _drawn(
         self, rng: np.random.Generator, options: ResetOptions
-    ) -> tuple[_Site, tuple[AnyCharge, ...], NDArray[np.int64]]:
-        """Draw site, charges and seeds of blasts (charges, realisations) of an episode."""
+    ) -> tuple[LayoutState, Episode]:
+        """Draw site, charges and seeds of blasts of an episode; return its first layout and it."""
         task = self.task
-        # Site, charges, seeds: always in this order, and as many numbers, whatever is fixed
+        # 1. Site, charges, seeds: always in this order, and as many numbers, whatever is fixed
         # afterwards.
-        scenario = task.source.sample(rng)
-        site = self.site_of(scenario)
-        drawn = task.threat_model.draw(scenario, rng)
-        seeds = SeedRange.TRAINING.draw(rng, (len(drawn), task.realisations))
+        site = self.site_of(task.source.sample(rng))
+        charges = task.threat_model.draw(site.empty.scenario, rng)
+        seeds = SeedRange.TRAINING.draw(rng, (len(charges), task.realisations))
+        # 2. What is fixed takes the place of what was drawn.
         if options.blast_seed is not None:
             seeds = options.blast_seed + np.arange(seeds.size).reshape(seeds.shape)
         if options.fix_charge:
-            drawn = tuple(options.charge(draw) for draw in drawn)
-        return site, drawn, seeds
+            charges = tuple(options.charge(charge) for charge in charges)
+        # 3. The layout: that of the site, unless an option may say something else.
+        start = site.empty
+        is_empty = isinstance(options.layout, Sequence) and not options.layout
+        if options.fix_charge or not is_empty:  # another type is refused by name
+            scenario = start.scenario
+            if options.fix_charge:
+                scenario = scenario.with_possible_charges(charges)
+            start = LayoutState.of(scenario, options.layout)
+        shown = site.shown_of(task, charges)
+        return start, Episode(task, site, shown, seeds, start.checked)
 
     def place(self, indices: Sequence[int], actions: Sequence[int] | IntArray) -> None:
         """Make a choice, place a module or a piece, or finish, in each of some episodes.

@@ -17,7 +17,7 @@ from blast_env.envs.episode import Episode, Episodes
 from blast_env.envs.observable import one_of
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.evaluator import BlastStore
-from blast_env.values import whole_number
+from blast_env.values import MOST_SEED, whole_number
 
 _LOADS_EACH: Final = 16
 """Number of loads in memory per environment."""
@@ -35,7 +35,8 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     Args:
         num_envs: Number of environments.
         autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as in Gymnasium.
-        max_episode_steps: Number of steps after which an episode is truncated; `None` for none.
+        max_episode_steps: Number of steps after which an episode is truncated; `None` or -1 for
+            none, as in `gymnasium.make`.
         **arguments: Those of `BlastBarrierEnv`, except for a picture: `render_mode` is `None`.
 
     Raises:
@@ -71,7 +72,10 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         space: Any = self.single_action_space
         self._limits = np.array(getattr(space, "nvec", getattr(space, "n", 0)))
-        self._most_steps = max_episode_steps or np.inf
+        self._most_steps = np.inf
+        if max_episode_steps not in (None, -1):
+            most = whole_number("max_episode_steps", max_episode_steps, 1, MOST_SEED)
+            self._most_steps = float(most)
         self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -93,14 +97,20 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
 
         Raises:
             UnknownNameError: If there is no such option; the message has the nearest one.
-            BlastEnvError: If an option is invalid.
+            BlastEnvError: If the seed or an option is invalid; all episodes are as they were then.
         """
         count = self.num_envs
         seeds = [None] * count if seed is None else seed
         if isinstance(seeds, int | np.integer):
             seeds = range(int(seeds), int(seeds) + count)
+        if not isinstance(seeds, Sequence | np.ndarray):
+            raise BlastEnvError(
+                f"seed is {value_text(seed)}, must be an integer or {count} of them"
+            )
         if len(seeds) != count:
             raise BlastEnvError(f"seed has {len(seeds)} values, must have num_envs = {count}")
+        if not isinstance(options, Mapping | None):
+            raise BlastEnvError(f"options is {value_text(options)}, must be a mapping")
         given = dict(options or {})
         mask = np.asarray(given.pop("reset_mask", np.ones(count, dtype=np.bool_)))
         if mask.shape != (count,) or mask.dtype != np.bool_ or not (mask.all() or self._running):
@@ -197,10 +207,11 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             raise gym.error.InvalidAction(
                 f"actions have shape {given.shape} and type {given.dtype}, must be {shape} integers"
             )
-        if (given[played] < 0).any() or (given[played] >= self._limits).any():
-            least, most = given[played].min(), given[played].max()
+        are_wrong = (given < 0) | (given >= self._limits)
+        wrong = [index for index in played if are_wrong[index].any()]
+        if wrong:
             raise gym.error.InvalidAction(
-                f"actions are from {least} to {most}, must be in {self.one.action_space}"
+                f"actions[{wrong[0]}] is {given[wrong[0]]}, must be in {self.one.action_space}"
             )
         return given
 

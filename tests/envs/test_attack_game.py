@@ -68,6 +68,15 @@ def test_what_closes_the_drive_moves_the_places_of_the_vehicle() -> None:
     assert space.contains(after)
 
 
+def test_a_response_of_facades_may_be_what_the_attacker_wants() -> None:
+    played = AttackGame("clinic_front", engine="surrogate")
+    played.reset()
+    assert played.scenario.objective.is_response
+    played.step(int(played.placing.finish))
+    played.step(played.best_response())
+    assert played.rewards[ATTACKER] == 1.0
+
+
 def test_a_site_without_a_build_zone_is_refused() -> None:
     with pytest.raises(BlastEnvError, match="build zone"):
         AttackGame("free_field")

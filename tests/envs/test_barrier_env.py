@@ -93,12 +93,13 @@ def test_the_limit_of_illegal_actions_ends_the_episode_as_finishing_does() -> No
     assert rewards[2] == env.step(FINISH)[1] - 0.5
 
 
-@pytest.mark.parametrize("action", [-1, FINISH + 1, 1.5, "3"])
+@pytest.mark.parametrize("action", [-1, FINISH + 1, 1.5, "3", np.int64(99), [0, 99]])
 def test_an_action_outside_the_space_is_an_error(action: int) -> None:
     env = make()
     env.reset(seed=1)
-    with pytest.raises(gym.error.InvalidAction, match="must be in Discrete"):
+    with pytest.raises(gym.error.InvalidAction, match="must be in Discrete") as refused:
         env.step(action)
+    assert str(action) in str(refused.value)
 
 
 def test_stepping_before_reset_and_after_the_end_is_refused() -> None:

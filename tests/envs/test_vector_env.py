@@ -1,5 +1,6 @@
 """Environments in one batch: the same episodes as single ones, to the last bit."""
 
+import pickle
 from typing import Any
 
 import gymnasium as gym
@@ -75,6 +76,27 @@ def test_episodes_are_truncated_with_their_last_observation() -> None:
     check_same("SameStep", max_episode_steps=2, realisations=1, **chosen)
 
 
+def test_no_limit_of_steps_is_written_as_of_single_environments() -> None:
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    check_same(max_episode_steps=-1, realisations=1, **chosen)
+
+
+def test_a_refused_reset_leaves_every_episode_as_it_was() -> None:
+    """The charge stands clear on the first site drawn, and in a building of another one."""
+    envs = BlastBarrierVectorEnv(
+        6, observation="features", action="place", scenario="item_sites", engine=ShadeEngine()
+    )
+    _, info = envs.reset(seed=0)
+    envs.step(info["action_mask"].argmax(axis=1))
+    masks, finish = envs.action_masks(), np.full(6, envs.one.finish)
+    twin = pickle.loads(pickle.dumps(envs))
+    with pytest.raises(BlastEnvError, match="charge"):
+        envs.reset(options={"charge_position_m": (18.0, 6.0)})
+    assert (envs.action_masks() == masks).all()
+    ends, expected = envs.step(finish), twin.step(finish)
+    assert same((*ends[:4], uncounted(ends[4])), (*expected[:4], uncounted(expected[4])))
+
+
 def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
     """Observations of one's own are stacked; every episode has a site of its own."""
     check_same(scenario="sites", observation=CountOfModules(), engine=ShadeEngine(), least=1)
@@ -103,6 +125,9 @@ def test_it_takes_what_a_single_environment_takes() -> None:
         BlastBarrierVectorEnv(2, "Next")
     with pytest.raises(BlastEnvError, match="render_mode is 'human', must be None"):
         BlastBarrierVectorEnv(2, render_mode="human")
+    for wrong in (0, -2, 2.5, True):
+        with pytest.raises(BlastEnvError, match=f"max_episode_steps is {str(wrong).lower()}, must"):
+            BlastBarrierVectorEnv(2, max_episode_steps=wrong)  # type: ignore[arg-type]
 
 
 def test_wrong_calls_are_refused_and_change_nothing() -> None:
@@ -111,13 +136,17 @@ def test_wrong_calls_are_refused_and_change_nothing() -> None:
     with pytest.raises(gym.error.ResetNeeded):
         envs.step([0, 0])
     first, _ = envs.reset(seed=1)
-    for wrong in ([0], [0, 99], [0.5, 1.0]):
-        with pytest.raises(gym.error.InvalidAction, match="must be"):
+    for wrong, said in (([0], "shape"), ([0, 99], r"\[1\] is 99"), ([0.5, 1.0], "float")):
+        with pytest.raises(gym.error.InvalidAction, match=f"{said}.*must be"):
             envs.step(np.array(wrong))
     with pytest.raises(BlastEnvError, match=r"reset_mask has shape \(1,\)"):
         envs.reset(options={"reset_mask": np.array([True])})
     with pytest.raises(BlastEnvError, match="seed has 1 values"):
         envs.reset(seed=[1])
+    with pytest.raises(BlastEnvError, match=r"seed is 1\.0, must be an integer or 2 of them"):
+        envs.reset(seed=1.0)  # type: ignore[arg-type]
+    with pytest.raises(BlastEnvError, match="options is 3, must be a mapping"):
+        envs.reset(options=3)  # type: ignore[arg-type]
     assert same(envs.reset(seed=1)[0], first)
     envs.step([40, 0])
     with pytest.raises(gym.error.ResetNeeded, match=r"\[0\]"):
