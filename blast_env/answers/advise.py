@@ -4,7 +4,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from blast_env.answers.assess import impulse_lines
-from blast_env.answers.document import AnyPart, Line, Table, lines, percent
+from blast_env.answers.document import (
+    AnyPart,
+    Line,
+    Table,
+    left_out_words,
+    lines,
+    percent,
+)
 from blast_env.design.search.advice import Advice, MeasureKind
 from blast_env.design.search.advised import AdviceResult
 from blast_env.evaluation.questions.probability import DRAWS, probability_text
@@ -27,7 +34,9 @@ def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
     judge, best = found.judge, found.best
     scenario, target = judge.scenario, judge.target
     yield Line.of(_first_line(found, best), kind="answer")
-    yield from lines((f"flag: {note}" for note in judge.judged[best.layout].notes), "flag")
+    left_out = left_out_words(scenario, [threat.charge for threat in judge.problem.threats])
+    notes = *left_out, *judge.judged[best.layout].notes
+    yield from lines((f"flag: {note}" for note in notes), "flag")
     error = judge.error(best.layout)
     if error is not None:
         yield from impulse_lines(error)

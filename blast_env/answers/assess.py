@@ -14,6 +14,7 @@ from blast_env.answers.document import (
     Table,
     building_words,
     charge_text,
+    left_out_words,
     lines,
 )
 from blast_env.answers.pieces import pieces_answer
@@ -119,6 +120,8 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
     for building in judged.buildings:
         status = judged.validation(building).words
         yield Line.of(f"validation of the load that decides, {building}: {status}")
+    own = [threat.charge for threat in blasts.threats]
+    yield from lines((f"flag: {words}" for words in left_out_words(blasts.scenario, own)), "flag")
     yield from lines((f"flag: {note}" for note in judged.notes), "flag")
     if doubt := judged.doubt(target):
         yield Line.of(doubt)

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from math import floor, isfinite, isnan, log10, nan
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 
-from blast_env.site import ObjectiveSection, Scenario
+from blast_env.evaluation.cases import fixed_charges
+from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
 from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
@@ -300,9 +301,23 @@ def titled(name: str, title: str) -> str:
 
 
 def charge_text(charge: Charge) -> str:
-    """Return a charge in words: `100 kg at (2, 4) m`."""
+    """Return a charge in words: `100 kg at (2, 4) m`, `20 kg at (2, 4) m, 1.5 m high`."""
     x_m, y_m = charge.position_m
-    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
+    high = f", {charge.height_m:g} m high" if charge.height_m else ""
+    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m{high}"
+
+
+def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
+    """Yield that some of the fixed charges of a site are not among those of an answer.
+
+    Nothing is said of charges at other places, which the user gave.
+    """
+    counted = [charge for charge in charges if isinstance(charge, Charge)]
+    places = {(charge.position_m, charge.height_m) for charge in counted}
+    fixed = fixed_charges(scenario)
+    left_out = [charge for charge in fixed if (charge.position_m, charge.height_m) not in places]
+    if 0 < len(left_out) < len(fixed):
+        yield f"not among these: {len(left_out)} of the {len(fixed)} fixed charges of the site"
 
 
 def validation_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:

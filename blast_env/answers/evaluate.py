@@ -12,6 +12,7 @@ from blast_env.answers.document import (
     Table,
     building_words,
     interval,
+    left_out_words,
     lines,
     percent,
     validation_lines,
@@ -58,11 +59,15 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     is_scaled = found.engine.needs_calibration
     law = f"calibration {found.calibration}, " if is_scaled else ""
     yield Line.of(f"{law}scenario hash {scenario.content_hash[:12]}", kind="quiet")
+    charges = [threat.charge for threat in found.threats]
+    yield from lines(f"note: {words}" for words in left_out_words(scenario, charges))
     fixed = len(fixed_charges(scenario))
-    if fixed > 1 and are_all(scenario, [threat.charge for threat in found.threats]):
+    if fixed > 1 and are_all(scenario, charges):
+        weighted = len({source.weight for source in scenario.charge}) > 1
+        alike = " alike, whatever their weights" if weighted else ""
         yield Line.of(
-            f"note: the site has {fixed} fixed charges, which all count here; the interval is "
-            "their spread, not an uncertainty about others"
+            f"note: the site has {fixed} fixed charges, which all count here{alike}; the interval "
+            "is their spread, not an uncertainty about others"
         )
     yield from lines((f"note: {note}" for note in found.notes), "flag")
 

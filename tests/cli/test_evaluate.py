@@ -140,7 +140,22 @@ def test_fixed_charges_count_once_each_and_are_named(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     met = pd.read_csv(tmp_path / "out" / "threats.csv")[["charge_x_m", "charge_y_m"]]
     assert {*met.itertuples(index=False, name=None)} == {*places}
-    assert "note: the site has 3 fixed charges" in result.stdout
+    assert "note: the site has 3 fixed charges, which all count here; the" in result.stdout
+
+
+def test_fixed_charges_that_do_not_count_by_their_weights_or_at_all_are_named(
+    tmp_path: Path,
+) -> None:
+    places = ((2.0, 5.0), (2.0, 9.0))
+    points = [PointSource(kind="point", position_m=place, tnt_kg=100.0) for place in places]
+    points[0] = points[0].model_copy(update={"weight": 9.0})
+    site = small_scenario().model_copy(update={"charge": tuple(points)})
+    save_scenario(site, tmp_path / "points.toml")
+    (tmp_path / "layout.json").write_text("[]")
+    options = ("--scenario", tmp_path / "points.toml", "--layout", tmp_path / "layout.json")
+    both, one = (evaluate(*options, "--seeds", seeds).stdout for seeds in (2, 1))
+    assert "2 fixed charges, which all count here alike, whatever their weights" in both
+    assert "note: not among these: 1 of the 2 fixed charges of the site" in one
 
 
 def test_a_layout_is_exported_with_its_provenance(tmp_path: Path) -> None:
