@@ -74,8 +74,10 @@ def _loads(result: "BlastResult | GasResult") -> tuple[tuple[StructureLoad, ...]
 def _impulse_texts(loads: Sequence[StructureLoad]) -> dict[str, str]:
     """Return the impulse on each building, marked if it is outside the range."""
     return {
-        on_building.name: f"{'' if on_building.in_range else '~'}{on_building.impulse_pa_s:,.0f}"
-        for on_building in on_buildings(loads)
+        load.name: "-"
+        if isnan(load.impulse_pa_s)
+        else f"{'' if load.in_range else '~'}{load.impulse_pa_s:,.0f}"
+        for load in on_buildings(loads)
     }
 
 
@@ -90,9 +92,9 @@ def _gas_answer(result: "GasResult") -> Iterator[AnyPart]:
             "yes" if row["protected"] else "no",
             impulses[row["building"]],
             _captured(row),
-            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
+            _number(row["peak_pa"] / PA_PER_KPA, ",.1f"),
             _number(MS_PER_S * row["arrival_s"], ".1f"),
-            f"{row['most_loaded_face']} {row['most_loaded_pa_s']:,.0f}",
+            f"{row['most_loaded_face']} {_number(row['most_loaded_pa_s'], ',.0f')}".strip(),
             _number(row["roof_impulse_pa_s"], ",.0f"),
             row["validation"],
         )
@@ -121,6 +123,11 @@ def _gas_answer(result: "GasResult") -> Iterator[AnyPart]:
         if not note.startswith(said)
     ]
     texts += [note for note in result.stepped_notes if not note.endswith(said)]
+    texts += [
+        f"{row['building']}: no air touches its assessed walls ({row['faces']}): it has no load"
+        for row in result.buildings.to_dict("records")
+        if not row["most_loaded_face"]
+    ]
     texts += result.moved_gauges
     texts += (f"{wall.building}: {wall.words}" for wall in result.unjudged)
     cells = " x ".join(str(count) for count in result.run.grid.shape)

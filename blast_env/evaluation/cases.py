@@ -319,11 +319,20 @@ def check_distinct(threats: Sequence[LoadCase]) -> None:
 
 
 def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
-    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats)."""
+    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats).
+
+    A load that is not a number is refused, too: no air touches the walls that it is the mean of.
+    """
     for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
+        name = case.name or case.scenario.name
+        if np.isnan(mean):
+            raise BlastEnvError(
+                f"{name}: a protected building has no load without a barrier: no air touches its "
+                "assessed walls (`blast-env simulate` names it)"
+            )
         if not mean > 0.0:
             raise BlastEnvError(
-                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
+                f"{name}: nothing arrives at the protected structures "
                 f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
             )
 

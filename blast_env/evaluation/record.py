@@ -127,8 +127,10 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
 
 
 def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
-    # Impulses are means over the area, peaks the largest, and notes those of the worst part.
+    # Impulses are means over the area, peaks the largest, and notes those of the worst part. A part
+    # among others that no air touches has no load of its own.
     counted = counted_parts(parts)
+    counted = [part for part in counted if part.area_m2 != 0.0] or counted
     areas_m2 = [part.area_m2 for part in counted if part.area_m2 is not None]
     weights = [part.weight for part in counted]
     is_known = len(areas_m2) == len(counted)
@@ -138,7 +140,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     return replace(
         counted[0],
         name=name,
-        weight=sum(weights),
+        weight=sum(part.weight for part in counted_parts(parts)),
         impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
         peak_pa=max(peaks_pa, default=None),
         in_range=all(part.in_range for part in counted),
@@ -205,12 +207,13 @@ class BlastLoads:
     def are_for(self, scenario: AnyScenario) -> bool:
         """Return whether these can be the loads of a scenario.
 
-        They must be finite, one per structure and module, with its bays where it needs them.
+        They must be finite, one per structure and module, with its bays where it needs them. Walls
+        that no air touches have none.
         """
         found = find_scenario(scenario)
         names = [structure.name for structure in found.structures]
         modules = sum(structure.modules for structure in found.structures)
-        impulses = np.array([load.impulse_pa_s for load in self.structures])
+        impulses = [load.impulse_pa_s for load in self.structures if load.area_m2 != 0.0]
         on_modules = self.module_impulse_sim if self.has_particles else self.module_impulse_n_s
         return (
             [load.name for load in self.structures] == names

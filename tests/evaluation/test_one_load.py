@@ -5,21 +5,26 @@ protects. Its load is the mean of the peak specific impulse over the area of the
 count of its protected parts.
 """
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from blast_env.answers import Line
 from blast_env.answers.compare import comparison
+from blast_env.answers.simulate import blast_answer
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.record import BlastRecord
+from blast_env.evaluation.record import BlastRecord, on_buildings
 from blast_env.gas import stepped_buildings
 from blast_env.geometry import Layout
 from blast_env.site import Charge, Scenario
 from tests.app.here import rows_of
-from tests.gas_sites import site_document
+from tests.builders import block
+from tests.gas_sites import hut, site_document
 
 CHARGE = Charge((2.0, 4.0), 5.0)
 ENGINE = GasEngine(border_m=0.0)
@@ -105,3 +110,35 @@ def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
     assert building.structure == "hall"
     for row in (together, building):
         assert float(row.impulse.replace(",", "")) == pytest.approx(load_pa_s, rel=5e-3)
+
+
+def two_parts(building: str) -> Scenario:
+    """Return the hut in two halves; none of the counted walls of the eastern one is in the air."""
+    west = block("west", 6.0, 3.0, 4, 2, height_m=2.0, protected=True, faces=["west"])
+    east = west | {"name": "east", "corner_m": [7.0, 3.0]}
+    halves = [west | {"building": "hut"}, east | {"building": building}]
+    return hut(structures=halves)
+
+
+def test_a_part_that_no_air_touches_leaves_the_building_its_load(tmp_path: Path) -> None:
+    """It had made the load of the building NaN, and of its blasts ones that no store gave back."""
+    site, threat = two_parts("hut"), LoadCase(CHARGE, 0)
+    evaluators = [BlastEvaluator(site, ENGINE, cache=tmp_path) for _ in range(2)]
+    first, again = (own.loads((), threat) for own in evaluators)
+    alone = BlastEvaluator(hut(structures=[site.structures[0].model_dump()]), ENGINE)
+    west = alone.loads((), threat).structures[0].impulse_pa_s
+    assert first.structures[0].impulse_pa_s == pytest.approx(west, rel=0.1)
+    assert np.isnan(first.structures[1].impulse_pa_s)
+    for loads in (first, again):
+        assert on_buildings(loads.protected)[0].impulse_pa_s == loads.structures[0].impulse_pa_s
+        assert loads.load(site.objective) == 2.0 * loads.structures[0].impulse_pa_s
+    assert [own.counts.blasts for own in evaluators] == [1, 0]
+
+
+def test_a_building_that_no_air_touches_has_no_load_and_that_is_said() -> None:
+    site, threats = two_parts("other"), [LoadCase(CHARGE, 0)]
+    answer = blast_answer(GasBlast(site, engine=ENGINE, charge=CHARGE).run())
+    texts = [part.text() for part in answer if isinstance(part, Line)]
+    assert "other: no air touches its assessed walls (west): it has no load" in texts
+    with pytest.raises(BlastEnvError, match=r"hut: a protected building has no load.*no air"):
+        evaluate_layout(site, (), threats=threats, engine=ENGINE)
