@@ -1,6 +1,6 @@
 """`blast-env report`: the report of an engineer to a client."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -129,16 +129,30 @@ def _study_options(scenario: Scenario, values: Mapping[str, Any]) -> "StudyOptio
 
 
 def _charge(given: str, scenario: Scenario) -> Charge:
-    """Return the charge of an option; without a mass, the one of the scenario's sources."""
-    masses_kg = sorted({source.tnt_kg for source in scenario.charge})
+    """Return the charge of an option, as high as the scenario's sources of that mass, or all.
+
+    Without a mass, it is the one of the scenario's sources.
+    """
     x_m, y_m, *own_kg = numbers("--charge", given, CHARGE)
+    masses_kg = {source.tnt_kg for source in scenario.charge}
     if not own_kg and len(masses_kg) > 1:
-        known = ", ".join(f"{mass_kg:g}" for mass_kg in masses_kg)
         raise BlastEnvError(
-            f"--charge is {x_m:g},{y_m:g} without a mass, but the scenario has charges of {known} "
-            "kg: say X,Y,KG"
+            f"--charge is {x_m:g},{y_m:g} without a mass, but the scenario has charges of "
+            f"{_listed(masses_kg)} kg: say X,Y,KG"
         )
-    return Charge((x_m, y_m), (own_kg or masses_kg)[0])
+    mass_kg = own_kg[0] if own_kg else min(masses_kg)
+    alike = [source for source in scenario.charge if source.tnt_kg == mass_kg]
+    heights_m = {source.height_m for source in alike or scenario.charge}
+    if len(heights_m) > 1:
+        raise BlastEnvError(
+            f"--charge is {given}, but the scenario has charges {_listed(heights_m)} m high: leave "
+            "those of one height in a file of their own"
+        )
+    return Charge((x_m, y_m), mass_kg, min(heights_m))
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:g}" for value in sorted(values))
 
 
 def _cells(text: str) -> Cells:

@@ -356,6 +356,61 @@ def test_command_passes_on_what_it_was_asked(
     assert options.limits == (Limit("hut", 9.0, 2000.0),)
 
 
+@pytest.mark.parametrize(
+    ("heights_m", "text", "charge"),
+    [
+        ((1.0, 1.0), "2,3,4", Charge((2.0, 3.0), 4.0, 1.0)),
+        ((0.0, 1.5), "2,3,7", Charge((2.0, 3.0), 7.0, 1.5)),
+        ((0.0, 1.5), "2,3,4", None),
+    ],
+)
+def test_a_charge_of_the_command_is_as_high_as_those_of_the_site(
+    heights_m: tuple[float, float],
+    text: str,
+    charge: Charge | None,
+    report: Report,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As with `assess --charge`; it had gone to the ground."""
+    document = small_hut().model_dump(mode="json", exclude_none=True)
+    (own,) = document["charge"]
+    pairs = zip((5.0, 7.0), heights_m, strict=True)
+    document["charge"] = [own | {"tnt_kg": mass, "height_m": high} for mass, high in pairs]
+    site, wall, out = (str(tmp_path / name) for name in ("s.toml", "w.json", "a.html"))
+    save_scenario(Scenario.from_document(document, "raised"), site)
+    write_layout(wall, small_hut(), LAYOUT, {})
+    given: list[StudyOptions] = []
+
+    def run(_: Scenario, __: Layout, options: StudyOptions, ___: object) -> Report:
+        given.append(options)
+        return report
+
+    monkeypatch.setattr(reports, "run_report", run)
+    monkeypatch.setattr(reports, "write_report", lambda _, *paths: [*paths[:1]])
+    files = ("report", site, "--layout", wall, "--out", out, "--charge", text)
+    done = CliRunner().invoke(app, [*files])
+    if charge is None:
+        assert done.exit_code == 2
+        words = " ".join(done.stderr.replace("\n", " ").split())
+        assert "--charge is 2,3,4, but the scenario has charges 0, 1.5 m high" in words
+    else:
+        assert [options.charges for options in given] == [(charge,)]
+
+
+def test_no_glass_keeps_a_limit_that_is_exceeded(study: Study) -> None:
+    """Its verdict had forgotten the limits, so that it said `complies`."""
+    loads = [own.load.wall_impulse_pa_s for side in study.verdicts for own in side.limited]
+    results = {}
+    for name, most_pa_s in (("kept", 2.0 * max(loads)), ("exceeded", 0.5 * min(loads))):
+        limits = (Limit("hut", impulse_pa_s=most_pa_s),)
+        document = report_document(Report(asked(study, limits=limits)))
+        rows = table_of(document, "Alternatives examined").rows
+        results[name] = [str(row[1]).split(" with the layout")[0] for row in rows[1:]]
+    assert any(result.startswith("complies") for result in results["kept"])
+    assert {*results["exceeded"]} == {"does not comply"}
+
+
 def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: str) -> None:
     verdict = study.verdicts[1]
     behind = study.protected.summary("hut")

@@ -1,6 +1,7 @@
 """What a report rests on: alternatives and cost, threats and buildings, assumptions, limits."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite, nan
 from typing import Final
 
@@ -10,7 +11,7 @@ from blast_env.evaluation.engines.walls import PeakSource
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.grid_error import FACTOR, ORDER
 from blast_env.evaluation.questions.limits import LoadLimit, SiteVerdict
-from blast_env.evaluation.questions.verdict import Verdict, consequences_of, other_glazing
+from blast_env.evaluation.questions.verdict import consequences_of, other_glazing
 from blast_env.evaluation.record import BuildingLoad
 from blast_env.evaluation.study import Study, gas_of
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -47,8 +48,7 @@ def _glazing(study: Study) -> Iterator[AnyPart]:
 
 
 def _word(side: SiteVerdict, glazing: Glazing) -> str:
-    passes = side.found.with_glazing(glazing).passes(side.target)
-    return Verdict.of(passes).word(side.is_flagged).lower()
+    return replace(side, found=side.found.with_glazing(glazing)).word.lower()
 
 
 def _priced(study: Study, glazing: str) -> str:
