@@ -32,6 +32,9 @@ HEADROOM_SITES: Final = "headroom_sites"
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
 """Those of an environment: all sites of a name have one size."""
 
+OF_ANY_SIZE: Final = (KERB_SITES, STREET_SITES, COURT_SITES, SQUARE_SITES, HEADROOM_SITES)
+"""Those whose sites differ in size and catalogue."""
+
 
 def bundled_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package."""

@@ -25,7 +25,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.response.levels import LevelOfProtection
 from blast_env.sections import PointM
-from blast_env.site import AnyCharge, Scenario, VehicleCharge
+from blast_env.site import AnyCharge, Scenario
 from blast_env.values import plain_number, printable
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
@@ -230,8 +230,7 @@ class ChargeInput:
         if not options.fix_charge:
             return drawn
         charge = options.charge(drawn)
-        if not isinstance(charge, VehicleCharge):
-            scenario.with_charge(charge)  # refuses a place that is not clear
+        scenario.check_charge(charge)
         return charge
 
     def threats(self, scenario: Scenario, draws: int) -> tuple[LoadCase, ...]:

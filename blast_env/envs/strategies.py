@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.bundled import GENERATED
+from blast_env.bundled import GENERATED, OF_ANY_SIZE
 from blast_env.envs.arguments import strategy
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Engine
@@ -164,9 +164,16 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
 
     Raises:
         ScenarioError: If there is no such scenario, or it is invalid.
-        BlastEnvError: If it has no build zone, or has another type.
+        BlastEnvError: If it has no build zone, has another type, or is a kind of generated sites of
+            any size.
     """
     source: ScenarioSource
+    if isinstance(scenario, str) and scenario in OF_ANY_SIZE:
+        raise BlastEnvError(
+            f"scenario is {scenario!r}, whose sites differ in size and catalogue: an environment"
+            f" takes one of them, as of blast_env.sites.{scenario.removesuffix('s')}(seed), or one"
+            f" of the kinds {', '.join(GENERATED)}"
+        )
     if isinstance(scenario, str) and scenario in GENERATED:
         from blast_env.sites import training_sites  # generation is a room of its own
 

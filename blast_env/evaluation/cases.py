@@ -190,6 +190,7 @@ class LoadCaseSet:
         search_set: The set for the blasts of a search, without any of `threats`.
 
     Raises:
+        ScenarioError: If the known charge could not be on the site.
         BlastEnvError: If there are no threats, they are not as many for each charge, or one of
             `search_set` is among them.
     """
@@ -207,6 +208,9 @@ class LoadCaseSet:
         object.__setattr__(self, "scenario", find_scenario(self.scenario))
         if not self.threats:
             raise BlastEnvError("threats: there are none, must be at least one")
+        if self.charge is not None:
+            object.__setattr__(self, "charge", LoadCase(self.charge).charge)
+            self.scenario.check_charge(self.charge)
         charges = self.charges
         for index, threat in enumerate(self.threats):
             if (

@@ -233,6 +233,15 @@ class Scenario(Content):
             raise BlastEnvError(f"charge is {value_text(charge)}, must be a Charge")
         return self._with_points((), (charge,))
 
+    def check_charge(self, charge: AnyCharge) -> None:
+        """Refuse a known charge that could not be on the site.
+
+        Raises:
+            ScenarioError: If it is out of bounds, or not clear of a structure or the border.
+        """
+        if not isinstance(charge, VehicleCharge) and not self.may_have(charge):
+            self.with_charge(charge)
+
     def may_have(self, charge: Charge) -> bool:
         """Return whether a charge is one of the scenario's own, at a place that was checked."""
         try:

@@ -12,14 +12,13 @@ from blast_env.sites.criterion import Objection, SiteCriterion
 from blast_env.sites.module_sites import SiteRanges
 from blast_env.sites.ranges import Draws, Ranges
 from blast_env.sites.turning import turned
+from blast_env.values import generator
 
 RANGES: Final = SiteRanges()
 """The default ranges of sites."""
 
 MOST_TRIES: Final = 200
 """Most sites that are drawn for a seed."""
-
-MOST_SEED: Final = 2**63 - 1
 
 HELD_OUT_SITES: Final = 10_000
 """Number of held-out seeds, 0 to 9,999; training uses the seeds from 10,000."""
@@ -42,11 +41,7 @@ def generate_site(
     Raises:
         BlastEnvError: If the seed is out of bounds, or none of 200 sites is accepted.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise BlastEnvError(f"seed is {seed!r}, must be an integer")
-    if not 0 <= seed <= MOST_SEED:
-        raise BlastEnvError(f"seed is {seed}, must be 0 to {MOST_SEED}")
-    rng = np.random.default_rng(int(seed))
+    rng = generator(seed)
     wanted = criterion or ranges.criterion
     objections: list[Objection] = []
     for _ in range(MOST_TRIES):

@@ -12,6 +12,7 @@ from blast_env.site import Scenario
 from blast_env.sites.generate import HELD_OUT_SITES, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges
 from blast_env.sites.kerb_sites import kerb_site
+from blast_env.values import checked_seed
 
 HEADROOM_HELD_OUT: Final = (
     *((ITEM_SITES, seed) for seed in (17, 29, 32)),
@@ -35,6 +36,7 @@ def headroom_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: If the seed is out of bounds.
     """
+    checked_seed(seed)
     for first, sites in ((0, HEADROOM_HELD_OUT), (HELD_OUT_SITES, HEADROOM_TRAINING)):
         if first <= seed < first + len(sites):
             kind, own = sites[seed - first]

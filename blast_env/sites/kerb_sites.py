@@ -34,6 +34,7 @@ from blast_env.sites.ranges import (
     structure,
 )
 from blast_env.units import MODULE_SIDE_M
+from blast_env.values import checked_seed
 
 ACROSS_M: Final[Span] = (13.0, 34.0)
 """Least and largest size of a site from the kerb to behind the front, m."""
@@ -186,7 +187,7 @@ def kerb_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M))))
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M))))
     across_m, along_m = draws.length_m(ACROSS_M), draws.length_m(ALONG_M)
     return generate_site(seed, KerbSiteRanges(across_m=across_m, along_m=along_m))
 
@@ -202,7 +203,7 @@ def street_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 1)))
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 1)))
     across_m, along_m = draws.length_m(STREET_ACROSS_M), draws.length_m(STREET_ALONG_M)
     ranges = KerbSiteRanges(
         across_m=across_m,
@@ -227,7 +228,7 @@ def court_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 2)))
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 2)))
     across_m, along_m = draws.length_m(COURT_ACROSS_M), draws.length_m(COURT_ALONG_M)
     ranges = KerbSiteRanges(
         across_m=across_m,
@@ -255,7 +256,7 @@ def square_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((seed, len(_HEIGHTS_M), 3)))
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 3)))
     across_m, along_m = draws.length_m(SQUARE_ACROSS_M), draws.length_m(SQUARE_ALONG_M)
     ranges = KerbSiteRanges(
         across_m=across_m,

@@ -21,11 +21,12 @@ from blast_env.bundled import (
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
-from blast_env.sites.generate import HELD_OUT_SITES, MOST_SEED, RANGES, generate_site
+from blast_env.sites.generate import HELD_OUT_SITES, RANGES, generate_site
 from blast_env.sites.headroom_sites import headroom_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
 from blast_env.sites.kerb_sites import court_site, kerb_site, square_site, street_site
 from blast_env.sites.ranges import Ranges
+from blast_env.values import MOST_SEED
 
 FAMILIES: Final[Mapping[str, Ranges]] = MappingProxyType(
     {SITES: RANGES, ITEM_SITES: ItemSiteRanges(), LARGE_SITES: large_ranges()}

@@ -26,7 +26,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastStore, BudgetError
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.validation import worst_validation
-from blast_env.geometry import Layout
+from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
 from blast_env.layout.placement import load_relevant
 from blast_env.rules import random_layout
@@ -66,7 +66,7 @@ class Session:
     Every tool is a method whose result is a record. A blast is charged when it has succeeded, once
     for each layout. The score is 0 with nothing placed and 1 for the best known layout; the judge
     blasts the submitted layout anew, on finer cells. It is given once; then the session has ended,
-    and all tools refuse.
+    and all tools refuse. Layouts may be those of the rest of the package, too.
 
     Sessions share nothing. A session may be used from several threads; its blasts run one after the
     other, in a thread of its own.
@@ -158,7 +158,7 @@ class Session:
         words = "legal layouts, none of which was blasted"
         return Proposals(proposals=proposals_for(self._problem, self.seed), **self._common(words))
 
-    def check(self, layout: Sequence[PlacedPiece]) -> Legality:
+    def check(self, layout: Sequence[PlacedPiece | Element]) -> Legality:
         """Return whether a layout is legal, or why not.
 
         Raises:
@@ -168,7 +168,7 @@ class Session:
         found = legality_of(self._problem, layout)
         return Legality(**found, **self._common("exact"))
 
-    def guess(self, layout: Sequence[PlacedPiece]) -> GuessedShare:
+    def guess(self, layout: Sequence[PlacedPiece | Element]) -> GuessedShare:
         """Return a prediction of the share of the load that a layout leaves.
 
         It is free, and no score depends on it.
@@ -187,7 +187,7 @@ class Session:
         share, low, high = guessed_shares(self._problem, *self._surrogate, checked)
         return GuessedShare(share=share, low=low, high=high, **self._common(self._guess_words))
 
-    def blast(self, layout: Sequence[PlacedPiece]) -> Outcome:
+    def blast(self, layout: Sequence[PlacedPiece | Element]) -> Outcome:
         """Return the share of the load that a layout leaves, by a blast.
 
         A layout that was blasted before is free, and its result is the same.
@@ -220,7 +220,7 @@ class Session:
             )
         return self._outcome(ticket)
 
-    def submit(self, layout: Sequence[PlacedPiece]) -> Outcome:
+    def submit(self, layout: Sequence[PlacedPiece | Element]) -> Outcome:
         """Submit a layout, which ends the session, and return its score.
 
         Raises:
@@ -252,7 +252,7 @@ class Session:
                 f"{self._submitted!r}"
             )
 
-    def _checked(self, layout: Sequence[PlacedPiece]) -> Layout:
+    def _checked(self, layout: Sequence[PlacedPiece | Element]) -> Layout:
         """Return a legal layout, sorted."""
         try:
             elements = [element_in(self._problem, piece) for piece in layout]
@@ -394,8 +394,9 @@ class Session:
     @property
     def _guess_words(self) -> str:
         fit = self._surrogate[0].fit
+        _, _, version = fit.engine.split(" (")[0].split(maxsplit=2)  # after the class and the name
         words = (
-            f"a prediction from {fit.blasts:,} loads by {fit.engine.split(' (')[0]}, with "
+            f"a prediction from {fit.blasts:,} loads by {version}, with "
             "the 95 % interval of loads on new sites; never scored"
         )
         if self._problem.scenario.objective.is_response:

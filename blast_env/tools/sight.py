@@ -88,7 +88,9 @@ def proposals_for(problem: BenchmarkProblem, seed: int) -> tuple[Proposal, ...]:
     return (*found, Proposal(rule="random", layout=pieces_of(drawn), cost=cost, note=note))
 
 
-def legality_of(problem: BenchmarkProblem, layout: Sequence[PlacedPiece]) -> dict[str, Any]:
+def legality_of(
+    problem: BenchmarkProblem, layout: Sequence[PlacedPiece | Element]
+) -> dict[str, Any]:
     """Return whether a layout is legal, the reasons against it, and the cost of what is legal."""
     placement, reasons = LayoutState.empty(problem.scenario), []
     for piece in layout:
@@ -99,8 +101,14 @@ def legality_of(problem: BenchmarkProblem, layout: Sequence[PlacedPiece]) -> dic
     return {"legal": not reasons, "reasons": tuple(reasons), "cost": placement.cost}
 
 
-def element_in(problem: BenchmarkProblem, piece: PlacedPiece) -> Element:
-    """Return the element of a piece, which need not be legal."""
+def element_in(problem: BenchmarkProblem, piece: PlacedPiece | Element) -> Element:
+    """Return the element of a piece, which need not be legal.
+
+    Raises:
+        BlastEnvError: If it has another form.
+    """
+    if not isinstance(piece, PlacedPiece):
+        return problem.scenario.zone.catalogue.element_from(piece, "a piece")
     names = [item.item for item in _items(problem.scenario)]
     if names and not piece.item:
         raise BlastEnvError(

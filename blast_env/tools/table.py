@@ -130,7 +130,7 @@ def call_tool(
         raise UnknownNameError("tool", name, tools)
     tool = tools[name]
     try:
-        given = checked_as(tool.arguments, dict(arguments))
+        given = checked_as(tool.arguments, arguments)
     except BlastEnvError as error:
         known = ", ".join(tool.arguments.model_fields) or "none"
         message = f"{name} was not called: {error}; its arguments: {known}"

@@ -49,6 +49,7 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
         ({"invalid_action_cost": -1.0}, "invalid_action_cost is -1, must be a number from 0"),
         ({"invalid_action_limit": 0}, "invalid_action_limit is 0, must be an integer from 1"),
         ({"scenario": 3}, "scenario is 3, must be a name, a path, a Scenario"),
+        ({"scenario": "kerb_sites"}, "takes one of them, as of blast_env.sites.kerb_site(seed)"),
         (
             {"reward": 3},
             "reward is 3, must be one of 'incremental', 'relative', 'terminal', or have",

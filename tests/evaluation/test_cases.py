@@ -117,6 +117,29 @@ def test_a_charge_that_is_drawn_twice_counts_twice() -> None:
     assert case.combined([1.0, 2.0, 6.0]) == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize(
+    ("charge", "words"),
+    [
+        (((-1.0, 15.0), 100.0), r"position_m\[0\]: is -1"),
+        (((5.0, 15.0), 0.0), "tnt_kg: is 0"),
+        (((29.0, 15.0), 100.0), "must keep clear of it"),
+        (((500.0, 15.0), 100.0), "must lie inside the site"),
+        ((5.0, 15.0), "must be .* in m, kg of TNT"),
+    ],
+)
+def test_a_known_charge_that_could_not_be_there_is_refused(charge: Any, words: str) -> None:
+    """Before a search or a proposal, also by guesses, which no engine would refuse."""
+    with pytest.raises(BlastEnvError, match=words):
+        search_set(COURTYARD, charge)
+
+
+def test_a_known_charge_may_be_written_in_numbers() -> None:
+    plain: Any = (np.array([4, 15]), 20)
+    case = search_set(COURTYARD, plain)
+    assert case.charge == Charge((4.0, 15.0), 20.0)
+    assert case.threats == search_set(COURTYARD, case.charge).threats
+
+
 def test_threats_out_of_order_are_refused() -> None:
     scenario = load_scenario("courtyard")
     first, second = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)

@@ -19,7 +19,14 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, SegmentSource, distance_m, source_bounds_m
-from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
+from blast_env.sites import (
+    SITE_KINDS,
+    Objection,
+    SiteRanges,
+    VisibilityCriterion,
+    draw_site,
+    generate_site,
+)
 
 RANGES = SiteRanges()
 SEEDS = st.integers(0, 2**63 - 1)
@@ -242,12 +249,13 @@ def test_preset_and_calibration_are_those_of_the_ranges() -> None:
 @pytest.mark.parametrize(
     ("seed", "words"),
     [
-        (-1, "seed is -1, must be 0 to"),
-        (2**63, "must be 0 to"),
+        (-1, "seed is -1, must be an integer from 0 to"),
+        (2**63, "must be an integer from 0 to"),
         (1.0, "is 1.0, must be an integer"),
         (True, "integer"),
     ],
 )
-def test_a_seed_out_of_bounds_is_an_error(seed: int, words: str) -> None:
+@pytest.mark.parametrize("kind", SITE_KINDS)
+def test_a_seed_out_of_bounds_is_an_error(kind: str, seed: int, words: str) -> None:
     with pytest.raises(BlastEnvError, match=words):
-        generate_site(seed)
+        SITE_KINDS[kind](seed)

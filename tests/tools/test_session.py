@@ -1,10 +1,12 @@
 """Sessions: what is charged, what is scored, and what a lost call may do."""
 
 import json
+import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from math import prod
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -188,6 +190,7 @@ def test_a_guess_is_free_and_has_an_interval() -> None:
         call_tool(own, "blast", {"layout": WALL}).model_dump()["blast"]["share"]
     )
     assert found["blasts_left"] == 10
+    assert re.search(r"loads by gas \d+, with", found["validity"])
     nothing = call_tool(own, "guess", {"layout": []}).model_dump()
     assert (nothing["low"], nothing["share"], nothing["high"]) == (1.0, 1.0, 1.0)
 
@@ -242,12 +245,24 @@ def test_malformed_arguments_are_refused_in_words() -> None:
         ("blast", {"layout": [{"row": -1, "column": 0}]}, r"layout\[0\].row is -1"),
         ("blast", {"layout": [{"row": 1, "column": 0, "item": "wal"}]}, "`check` has all reasons"),
         ("blast", {"layout": [{"row": 1, "column": 0}]}, "row 1, column 0 has no `item`.*low_wall"),
+        ("check", None, "check was not called: Input should be an object; its arguments: layout"),
         ("poll", {"ticket": "lottery"}, "there is no ticket 'lottery': `blast` and `submit` give"),
     ],
 )
-def test_errors_name_the_way_out(own: Session, name: str, arguments: dict, message: str) -> None:
+def test_errors_name_the_way_out(own: Session, name: str, arguments: Any, message: str) -> None:
     with pytest.raises(BlastEnvError, match=message):
         call_tool(own, name, arguments)
+
+
+def test_layouts_of_the_package_are_taken_as_they_are(own: Session) -> None:
+    """As searches, rules and agents return them, or written by hand."""
+    by_hand: Any = [(12, 0, "low_wall", True)]
+    assert own.check(BEST[:1]).legal
+    assert own.check(by_hand).legal
+    assert said(own.blast(BEST[:1]))["blast"] == said(own.blast(by_hand))["blast"]
+    assert own.check([(12, 0)]).reasons[0].startswith("a piece: has 2 values, must be (row, column")
+    with pytest.raises(BlastEnvError, match="nothing was charged: a piece: is 'w'"):
+        own.guess("wall")  # type: ignore[arg-type]
 
 
 def test_check_has_a_reason_for_each_piece(own: Session) -> None:
