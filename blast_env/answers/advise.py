@@ -11,6 +11,7 @@ from blast_env.answers.document import (
     left_out_words,
     lines,
     percent,
+    without_facade_words,
 )
 from blast_env.design.search.advice import Advice, MeasureKind
 from blast_env.design.search.advised import AdviceResult
@@ -35,7 +36,7 @@ def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
     scenario, target = judge.scenario, judge.target
     yield Line.of(_first_line(found, best), kind="answer")
     left_out = left_out_words(scenario, [threat.charge for threat in judge.problem.threats])
-    notes = *left_out, *judge.judged[best.layout].notes
+    notes = *left_out, *without_facade_words(scenario), *judge.judged[best.layout].notes
     yield from lines((f"flag: {note}" for note in notes), "flag")
     error = judge.error(best.layout)
     if error is not None:

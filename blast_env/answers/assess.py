@@ -16,6 +16,7 @@ from blast_env.answers.document import (
     charge_text,
     left_out_words,
     lines,
+    without_facade_words,
 )
 from blast_env.answers.pieces import pieces_answer
 from blast_env.evaluation.blasts import Blasts, NumberOf
@@ -121,8 +122,8 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
         status = judged.validation(building).words
         yield Line.of(f"validation of the load that decides, {building}: {status}")
     own = [threat.charge for threat in blasts.threats]
-    yield from lines((f"flag: {words}" for words in left_out_words(blasts.scenario, own)), "flag")
-    yield from lines((f"flag: {note}" for note in judged.notes), "flag")
+    left_out = *left_out_words(blasts.scenario, own), *without_facade_words(blasts.scenario)
+    yield from lines((f"flag: {note}" for note in (*left_out, *judged.notes)), "flag")
     if doubt := judged.doubt(target):
         yield Line.of(doubt)
     yield Line.of(judged.force_words)

@@ -5,7 +5,7 @@ the terminal, typographic ones for pages.
 """
 
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, isnan, log10, nan
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 from blast_env.evaluation.cases import fixed_charges
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.site.structures import buildings_of
 from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
@@ -318,6 +319,18 @@ def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator
     left_out = [charge for charge in fixed if (charge.position_m, charge.height_m) not in places]
     if 0 < len(left_out) < len(fixed):
         yield f"not among these: {len(left_out)} of the {len(fixed)} fixed charges of the site"
+
+
+def without_facade_words(scenario: Scenario, limited: Collection[str] = ()) -> Iterator[str]:
+    """Yield which protected buildings have no facade, so that no level of protection covers them.
+
+    Args:
+        limited: Buildings that a verdict covers by limits of their loads.
+    """
+    for name, parts in buildings_of(scenario.structures).items():
+        protected = name not in limited and any(part.protected for part in parts)
+        if protected and all(part.facade is None for part in parts):
+            yield f"{name}: protected, but without a facade: no level of protection covers it"
 
 
 def validation_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from blast_env.answers.document import AnyPart, Line, Table
+from blast_env.answers.document import AnyPart, Line, Table, lines, without_facade_words
 from blast_env.evaluation.questions.screening import (
     BEHIND_LOW_BY,
     LOW_BY,
@@ -56,7 +56,7 @@ def screening_answer(
     behind = layout_counts(layout, "barrier") if layout else "no barrier"
     title = f"{scenario.name}, {behind}: worst place by damage"
     yield Table.of(title, _THREATS, rows, 2)
-    yield from (Line.of(words, kind="flag") for words in _covered_words(found))
+    yield from lines((*without_facade_words(scenario), *_covered_words(found)), "flag")
     for threat in found.threats:
         if threat.may_be_low:
             yield Line.of(_low_words(threat), kind="flag")

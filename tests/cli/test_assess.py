@@ -118,6 +118,22 @@ def test_a_verdict_names_how_many_fixed_charges_it_leaves_out(tmp_path: Path) ->
     assert [said in output for output in outputs] == [True, False]
 
 
+def test_a_verdict_names_the_protected_buildings_that_it_does_not_cover(tmp_path: Path) -> None:
+    document = glazed_hut().model_dump(mode="json", exclude_none=True)
+    shed = document["structures"][0] | {"name": "shed", "corner_m": [8.0, 0.5], "rows": 2}
+    del shed["facade"]
+    site = tmp_path / "two.toml"
+    said = {}
+    for is_protected in (True, False):
+        document["structures"][1:] = [shed | {"protected": is_protected}]
+        blast_env.save_scenario(Scenario.from_document(document, "two"), site)
+        for options in (("--cell", "0.5", "--charges", "1"), ("--screen",)):
+            output = " ".join(run(site, *options).split())
+            said[is_protected, options[0]] = "shed: protected, but without a facade" in output
+    assert said == {key: key[0] for key in said}
+    assert len(said) == 4
+
+
 # --- Screening: tables, the verdict by the requirement, and the picture.
 
 

@@ -3,7 +3,17 @@
 from collections.abc import Iterator
 
 from blast_env.answers.assess import response_table
-from blast_env.answers.document import AnyPart, Kind, Line, Number, Section, Table, percent
+from blast_env.answers.document import (
+    AnyPart,
+    Kind,
+    Line,
+    Number,
+    Section,
+    Table,
+    lines,
+    percent,
+    without_facade_words,
+)
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.capacity import mass_near
@@ -52,6 +62,9 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
     for walls in study.protected.unjudged:
         title = study.scenario.title_of(walls.building)
         yield Line.of(f"{title}: {walls.words}.", kind="flag")
+    if behind.is_asked:
+        limited = [own.limit.building for own in behind.limited]
+        yield from lines(without_facade_words(study.scenario, limited), "flag")
     if behind.doubt:
         yield Line.of(f"Cells clip peaks: {behind.doubt}.")
     if behind.found.buildings:
