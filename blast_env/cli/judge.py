@@ -41,7 +41,7 @@ from blast_env.cli.agents import (
     surrogate_search,
 )
 from blast_env.cli.command import writes
-from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
+from blast_env.cli.options import CacheOption, ProcessesOption, refuse_given, resume_words
 from blast_env.cli.output import print_outcome, print_written, progress_bar, resumable
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
@@ -50,6 +50,9 @@ from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_text
 
 _KEPT: Final = 4096
+_OF_METHODS: Final = ("problem", "budget", "seeds", "search_cell_m")
+_OF_SCENARIOS: Final = ("threat", "cases")
+_OF_SECRETS: Final = ("sites",)
 _NO_STANDINGS: Final = (Line.of("no submissions come with the package"),)
 
 _ScenarioOption = Annotated[
@@ -83,6 +86,7 @@ _SearchCellOption = Annotated[
 
 
 def judge(
+    context: typer.Context,
     submissions: list[Path] = typer.Argument(
         default=[], help="Files of submissions, judged ones too."
     ),
@@ -122,8 +126,10 @@ def judge(
     """
     judging = _Judging(cell_m, search_cell_m, range(seeds), processes, cache, out)
     plays = bool(method or run)
-    if not plays and (secret is not None or scenario):
+    is_secret = secret is not None
+    if not plays and (is_secret or scenario):
         raise BlastEnvError("--secret and --scenario need a --method or a --run to judge")
+    _refuse_without_effect(context, plays=plays, is_own=bool(scenario), is_secret=is_secret)
     resume = resume_words(cache)
     if plays and out is not None:
         resume = f"the same command resumes after the completed runs; {resume}"
@@ -139,12 +145,24 @@ def judge(
                 for item in _methods(method, run, tuple(dict.fromkeys(budget)), definitions)
             ]
             references = stored_references()
-            if secret is not None or scenario:
-                references = judging.references(played, definitions, is_secret=secret is not None)
+            if is_secret or scenario:
+                references = judging.references(played, definitions, is_secret=is_secret)
             judged += [judging.judged(item, definitions, references) for item in played]
     together = (*shipped_standings(), *judged)
     written = [] if page is None else [write_text(page, standings_page(together))]
     print_outcome(standings_tables(together) if together else _NO_STANDINGS, written)
+
+
+def _refuse_without_effect(
+    context: typer.Context, *, plays: bool, is_own: bool, is_secret: bool
+) -> None:
+    """Refuse options without the one that they belong to: all problems take hours."""
+    if not plays:
+        refuse_given(context, _OF_METHODS, "is for --method and --run")
+    if not is_own:
+        refuse_given(context, _OF_SCENARIOS, "is for --scenario")
+    if not is_secret:
+        refuse_given(context, _OF_SECRETS, "is for --secret")
 
 
 def _definitions(

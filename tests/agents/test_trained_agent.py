@@ -149,6 +149,8 @@ def test_the_charge_is_seen_when_it_is_told() -> None:
     agent = untrained(scenario)
     layouts = {agent.propose(scenario, Charge((5.0, y_m), 100.0)) for y_m in (7.0, 15.0, 23.0)}
     assert len(layouts | {agent.propose(scenario)}) > 1
+    with pytest.raises(BlastEnvError, match="must keep clear"):
+        agent.propose(scenario, Charge((29.0, 15.0), 100.0))
 
 
 def test_a_scenario_of_another_size_is_refused(run: Path) -> None:

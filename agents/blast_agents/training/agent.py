@@ -266,7 +266,10 @@ class PolicyAgent:
         return tuple(placement.layout for placement in placements)
 
     def _episode(self, scenario: Scenario, charge: AnyCharge | None) -> EpisodeObservation:
-        sources = scenario.charge if charge is None else (source_of(charge),)
+        sources = scenario.charge
+        if charge is not None:
+            scenario.check_charge(charge)
+            sources = (source_of(charge),)
         among_vehicles = bool(self.representative.vehicles)
         observable = Observable(scenario, sources, among_vehicles)
         return OBSERVATIONS[self.observation].episode(observable)
