@@ -208,15 +208,17 @@ class BlastLoads:
         """Return whether these can be the loads of a scenario.
 
         They must be finite, one per structure and module, with its bays where it needs them. Walls
-        that no air touches have none.
+        that no air touches have none, and neither have structures that a layout takes away.
         """
-        found = find_scenario(scenario)
-        names = [structure.name for structure in found.structures]
-        modules = sum(structure.modules for structure in found.structures)
+        found, names = find_scenario(scenario), [load.name for load in self.structures]
+        removable = () if found.build_zone is None else found.build_zone.removable
+        may_go = frozenset[str]().union(*[removal.structures for removal in removable])
+        left = [own for own in found.structures if own.name in names or own.name not in may_go]
+        modules = sum(structure.modules for structure in left)
         impulses = [load.impulse_pa_s for load in self.structures if load.area_m2 != 0.0]
         on_modules = self.module_impulse_sim if self.has_particles else self.module_impulse_n_s
         return (
-            [load.name for load in self.structures] == names
+            names == [structure.name for structure in left]
             and on_modules.shape == (modules,)
             and bool(np.isfinite(impulses).all() and np.isfinite(on_modules).all())
             and self._has_bays_of(found)

@@ -367,8 +367,12 @@ class Study:
         return self.found[self.blasts.judged]
 
     def buildings(self, *, protected: bool) -> tuple[str, ...]:
-        """Return the buildings with a known load, those that count or the others."""
-        known = self.blasts.records[NO_BARRIER][0].complete.buildings
+        """Return the buildings with a known load, those that count or the others.
+
+        Those that the layout takes away have none with it.
+        """
+        sides = (records[0].complete.buildings for records in self.blasts.records.values())
+        known = set.intersection(*(set(side) for side in sides))
         return tuple(
             name
             for name, parts in buildings_of(self.scenario.structures).items()

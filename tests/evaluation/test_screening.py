@@ -167,11 +167,12 @@ def test_bays_that_something_covers_in_part_are_named_and_those_of_party_walls_a
     assert flag.startswith("4 bays left out, before whose middle a structure or a piece stands")
     assert "office/west/1/1, office/west/1/2, office/west/1/3, ..." in flag
     document["structures"][0]["faces"] = ["west"]
-    covered = Scenario.from_document(
-        document | {"structures": [*document["structures"], balcony]}, "yard"
-    )
-    with pytest.raises(BlastEnvError, match=r"'hut'.*office/west/1/1.*no bay can be screened"):
-        screen(covered)
+    for other in (balcony, next_house):
+        covered = Scenario.from_document(
+            document | {"structures": [*document["structures"], other]}, "yard"
+        )
+        with pytest.raises(BlastEnvError, match=r"'hut'.*office/west/1/1.*no bay can be screened"):
+            screen(covered)
 
 
 def test_a_charge_above_the_ground_near_a_wall_says_that_gas_may_have_more() -> None:

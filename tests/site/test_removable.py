@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import blast_env
+from blast_env.answers import Table
+from blast_env.answers.report import Limit, StudyOptions, report_document, run_report
 from blast_env.design.search import DesignProblem, RandomSearch
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import LayoutError
-from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece, Removal, layout_words, standing
 from blast_env.io.export import LayoutPlan, bill_of_quantities
@@ -55,6 +57,41 @@ def test_a_blast_is_that_of_the_site_without_it() -> None:
     assert there.impulse("hut").pa_s < away.impulse("hut").pa_s
     names = [structure.name for structure in build_site(scenario, (AWAY,)).structures]
     assert names == ["hut"]
+
+
+@pytest.mark.parametrize("first", ["hut", "fence"])
+def test_a_layout_that_takes_it_away_is_judged_like_others(first: str, tmp_path: Path) -> None:
+    """Records, tables and the store had wanted a load on it; tables went by the order of loads."""
+    found = document()
+    found["structures"].sort(key=lambda structure: structure["name"] != first)
+    site = Scenario.from_document(found, "yard")
+    threat = LoadCase(site.sample_charge(np.random.default_rng(0)))
+    judged = evaluate_layout(site, (*WALL, AWAY), threats=[threat], engine=SHORT, cache=tmp_path)
+    known = BlastEvaluator(site, SHORT, cache=tmp_path)
+    whole, _ = known.loads((), threat), known.loads((*WALL, AWAY), threat)
+    assert known.counts.blasts == 0
+    (hut,) = (load for load in whole.structures if load.name == "hut")
+    for table in (judged.table, judged.building_table):
+        (row,) = table.to_dict("records")
+        assert row["structure"] == "hut"
+        assert row["unprotected_impulse_pa_s"] == hut.impulse_pa_s
+        assert row["impulse_pa_s"] != hut.impulse_pa_s
+    modules = judged.module_table
+    assert set(modules["structure"]) == {"hut"}
+    start = 0 if first == "hut" else 8  # modules of the fence
+    own = whole.module_impulse_n_s[start : start + len(modules)]
+    np.testing.assert_array_equal(modules["unprotected_impulse_n_s"], own)
+
+
+def test_a_report_on_a_layout_that_takes_it_away_is_of_what_is_left() -> None:
+    limits = (Limit("hut", impulse_pa_s=1.0), Limit("fence", impulse_pa_s=1.0))
+    options = StudyOptions(cells=(0.5, 0.5), items=False, places=1, limits=limits)
+    found = run_report(fenced(), (*WALL, AWAY), options)
+    assert found.study.buildings(protected=False) == ()
+    words = [own.limit.building for own in found.study.verdicts[1].limited]
+    assert words == ["hut"] * len(found.study.threats)
+    titles = [part.title for part in report_document(found).parts if isinstance(part, Table)]
+    assert "Limits of loads" in titles
 
 
 def test_it_is_a_part_of_layouts_that_blasts_meet_and_that_covers_no_cell(tmp_path: Path) -> None:

@@ -281,7 +281,9 @@ def _limits(study: Study) -> Iterator[AnyPart]:
 
 
 def _both(bare: SiteVerdict, behind: SiteVerdict) -> Iterator[tuple[LoadLimit, LoadLimit]]:
-    yield from zip(bare.limited, behind.limited, strict=True)
+    # A building that the layout takes away has no load with it.
+    without = {(own.limit.building, own.threat): own for own in bare.limited}
+    yield from ((without[own.limit.building, own.threat], own) for own in behind.limited)
 
 
 def _counted(load: BuildingLoad) -> AnyCell:

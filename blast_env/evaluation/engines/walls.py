@@ -230,9 +230,15 @@ def _building_loads(result: GasOutcome, histories: WallHistories) -> dict[str, B
     rows = result.buildings.set_index("building").to_dict("index")
     return {
         name: _building_load(result, name, structures, rows[name], histories)
-        for name, structures in buildings_of(result.blast.scenario.structures).items()
+        for name, structures in _remaining(result).items()
         if rows[name]["most_loaded_face"]
     }
+
+
+def _remaining(result: GasOutcome) -> dict[str, list[AnyStructure]]:
+    """Return the structures of each building, without those that the layout takes away."""
+    blast = result.blast
+    return buildings_of(blast.scenario.structures_with(blast.layout))
 
 
 def _building_load(
@@ -273,7 +279,7 @@ def _wall_loads(result: GasOutcome) -> Iterator[tuple[str, WallLoad]]:
     """Yield the name of each building, and the mean load on its most loaded wall."""
     faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]
-    for building, parts in buildings_of(result.blast.scenario.structures).items():
+    for building, parts in _remaining(result).items():
         own = walls[walls["structure"].isin([part.name for part in parts])]
         if len(own):
             impulses, peaks = (means_by_wall(own, name) for name in ("impulse_pa_s", "peak_pa"))
@@ -286,7 +292,7 @@ def _notes(result: GasOutcome, loads: Mapping[str, BuildingLoad]) -> Iterator[st
 
     The checked range counts for protected buildings alone, capture for all.
     """
-    for parts in buildings_of(result.blast.scenario.structures).values():
+    for parts in _remaining(result).values():
         if any(part.protected for part in parts):
             for part in parts:
                 yield from result.impulse(part.name).notes

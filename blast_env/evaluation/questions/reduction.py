@@ -459,21 +459,21 @@ class Evaluation:
         return self._by_name(lambda loads: on_buildings(loads.structures))
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
-        """Return one row per load in the result of `loads_of`."""
+        """Return one row per load in the result of `loads_of` that the layout leaves."""
 
-        def load_of(record: BlastRecord, number: int) -> StructureLoad:
-            return loads_of(record.loads)[number]
+        def load_of(record: BlastRecord, name: str) -> StructureLoad:
+            return next(load for load in loads_of(record.loads) if load.name == name)
 
-        count = len(loads_of(self.blasts.records[self.blasts.judged][0].loads))
+        left = loads_of(self.blasts.records[self.blasts.judged][0].loads)
         rows = [
-            _structure_row(self.blasts, partial(load_of, number=number), self.grid_error)
-            for number in range(count)
+            _structure_row(self.blasts, partial(load_of, name=load.name), self.grid_error)
+            for load in left
         ]
         return table_of(rows, STRUCTURE_COLUMNS)
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
-        """One row per module of the structures, in the scene's order.
+        """One row per module of the structures that the layout leaves, in the scene's order.
 
         The columns are `module_id`, `structure`, `x_m`, `y_m`, the load on the module with the
         barrier and without (for particles `impulse_sim`, the sum of m |v|; for gas `impulse_n_s`,
@@ -494,13 +494,18 @@ class Evaluation:
             )
             for side in _sides(self.blasts)
         )
+        left = {structure.name for structure in self.scenario.structures_with(self.layout)}
+        structures = [own for own in scene.structures if own.name in left]
+        if len(structures) < len(scene.structures):
+            is_left = [own.name in left for own in scene.structures for _ in own.filled]
+            without = without[is_left]
         values = {
             name: impulse,
             f"unprotected_{name}": without,
             "reduction": reductions(impulse, without),
         }
         names = ["module_id", "structure", "x_m", "y_m", *values]
-        obstacles = [obstacle_of(structure) for structure in scene.structures]
+        obstacles = [obstacle_of(structure) for structure in structures]
         return module_table(obstacles).assign(**values)[names]
 
     @cached_property

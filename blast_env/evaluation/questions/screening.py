@@ -285,7 +285,7 @@ def screen(
     if not facade.bays:
         raise BlastEnvError(
             f"scenario {scenario.name!r}: a structure or a piece of the layout stands before the"
-            f" middle of each bay ({facade.covered[0]} and so on): no bay can be screened"
+            f" middle of each bay ({bays[0].bay.name} and so on): no bay can be screened"
         )
     changed = None if atlas is None else SiteAtlas(facade.site, facade.walls, atlas)
     screened = []
