@@ -207,8 +207,8 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
             per cent), so use the same for all runs in a comparison.
 
     Raises:
-        BlastEnvError: If the radius is within the charge, or, without one, the charge is outside
-            the grid or in a solid cell.
+        BlastEnvError: If the radius is within the charge, the charge is too close above the ground
+            for the cells, or, without a radius, it is outside the grid or in a solid cell.
     """
     grid = solver.grid
     if radius_m is None:
@@ -217,6 +217,14 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
     start, (density, momentum, energy, fuel) = lay(profile, grid, charge)
     velocity = momentum / density
     inner = energy - 0.5 * (momentum * velocity).sum(axis=0)
+    # The hot products of a charge close above the ground overlap those of its mirror image: both
+    # together take more air away than there is.
+    if not (density.min() > 0.0 and inner.min() > 0.0):
+        raise BlastEnvError(
+            f"the charge of {charge.mass_kg:g} kg is {charge.position_m[2]:g} m high, too close"
+            f" above the ground for cells of {grid.cell_m:g} m, on which its front begins at"
+            f" {radius_m:.2g} m: take smaller cells or a height of 0"
+        )
     solver.set_state(
         density_kg_m3=density,
         velocity_m_s=tuple(velocity),

@@ -202,6 +202,20 @@ def test_charges_that_do_not_fit_are_named(place: tuple[float, float, float], me
         largest_radius_m(GasGrid(0.5, solid), GasCharge(5.0, place))
 
 
+def test_a_small_charge_close_above_the_ground_needs_smaller_cells() -> None:
+    """Its hot products and their mirror image would leave less than no air."""
+    charge = GasCharge(1.0, (3.0, 3.0, 0.1))
+    for cell_m in (0.25, 0.5):
+        grid = GasGrid(cell_m, np.zeros((24, 24, 12), dtype=np.bool_))
+        solver = GasSolver(grid, with_fuel=True, burning=charge.burning)
+        if cell_m == 0.25:
+            set_charge(solver, charge)
+            continue
+        words = r"charge of 1 kg is 0\.1 m high, too close above the ground for cells of 0\.5 m"
+        with pytest.raises(BlastEnvError, match=words):
+            set_charge(solver, charge)
+
+
 def test_a_charge_close_to_a_solid_is_laid_all_the_same() -> None:
     """When its front has run two cells; whoever asks is told how close it is."""
     solid = np.zeros((24, 24, 12), dtype=np.bool_)
