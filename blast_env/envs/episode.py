@@ -328,7 +328,8 @@ def _outcome(
     found |= {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
     if not evaluator.scenario.objective.is_response:
         return found
-    levels = [item.level.label if item.level else "" for item in (protected, unprotected)]
+    found_levels = (protected.level, unprotected.level)
+    levels = ["" if level is None else level.label for level in found_levels]
     return found | {
         "response": protected.load,
         "unprotected_response": unprotected.load,

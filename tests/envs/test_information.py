@@ -51,6 +51,16 @@ def test_all_steps_of_vectors_have_one_structure(name: str, mode: str) -> None:
     envs.close()
 
 
+def test_the_lowest_level_of_protection_has_a_name() -> None:
+    """Without it, a site that fails looked as before the end."""
+    env = gym.make("BlastBarrier-v0", scenario="clinic_front", engine="surrogate", action="place")
+    _, info = env.reset(seed=0)
+    assert info["level_of_protection"] == info["unprotected_level_of_protection"] == ""
+    *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+    assert info["level_of_protection"] == info["unprotected_level_of_protection"]
+    assert info["level_of_protection"] == "below standards"
+
+
 def test_the_layout_of_the_information_is_one() -> None:
     """An array of a fixed size, that everything which takes a layout takes."""
     env = make()
