@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 from blast_env.evaluation.cases import fixed_charges
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
-from blast_env.site.structures import buildings_of
+from blast_env.site.structures import without_facade
 from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
@@ -327,9 +327,8 @@ def without_facade_words(scenario: Scenario, limited: Collection[str] = ()) -> I
     Args:
         limited: Buildings that a verdict covers by limits of their loads.
     """
-    for name, parts in buildings_of(scenario.structures).items():
-        protected = name not in limited and any(part.protected for part in parts)
-        if protected and all(part.facade is None for part in parts):
+    for name in without_facade(scenario.structures):
+        if name not in limited:
             yield f"{name}: protected, but without a facade: no level of protection covers it"
 
 

@@ -370,6 +370,15 @@ def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStruct
     return buildings
 
 
+def without_facade(structures: Iterable[AnyStructure]) -> list[str]:
+    """Return the names of protected buildings without a facade, which have no response."""
+    return [
+        name
+        for name, parts in buildings_of(structures).items()
+        if any(part.protected for part in parts) and all(part.facade is None for part in parts)
+    ]
+
+
 def terrace_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:
     """Yield the problems of terraces, each of which must be solid and have a height."""
     for index, structure in enumerate(structures):

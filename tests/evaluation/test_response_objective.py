@@ -15,7 +15,7 @@ from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
 from blast_env.layout import LayoutState
 from blast_env.response import LevelOfProtection, peak_corrected, peak_factor, respond
-from blast_env.site import Charge
+from blast_env.site import Charge, Scenario
 from blast_env.surrogate import SurrogateEngine
 from tests.catalogue_sites import WALL
 from tests.evaluation.cases import evaluate_against
@@ -138,3 +138,14 @@ def test_evaluation_reports_the_shares_of_the_objective(evaluator: BlastEvaluato
     assert evaluation.mean_reduction == pytest.approx(
         1.0 - evaluation.load / evaluation.unprotected_load
     )
+
+
+def test_a_protected_building_without_a_facade_is_named_since_it_counts_as_nothing() -> None:
+    document = DAMAGE.model_dump(mode="json", exclude_none=True)
+    (hut,) = document["structures"]
+    shed = {key: value for key, value in hut.items() if key != "facade"}
+    document["structures"].append(shed | {"name": "shed", "corner_m": [7.5, 0.5], "rows": 4})
+    site = Scenario.from_document(document, "yard")
+    found = evaluate_against(BlastEvaluator(site, "gas"), (), [THREAT])
+    assert "shed: protected, but without a facade: its response counts as 0" in found.notes
+    assert found.table["structure"].tolist() == ["hut", "shed"]

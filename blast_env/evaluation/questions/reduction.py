@@ -27,6 +27,7 @@ from blast_env.layout.build_site import build_site
 from blast_env.provenance import versions
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.site.structures import without_facade
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,
@@ -522,6 +523,11 @@ class Evaluation:
     def notes(self) -> tuple[str, ...]:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [*self.engine.caveats(self.scenario)]
+        if self.scenario.objective.is_response:
+            notes += (
+                f"{name}: protected, but without a facade: its response counts as 0"
+                for name in without_facade(self.scenario.structures)
+            )
         checked = self.engine.validated_range
         own = (record.loads.structures for record in self.blasts.records[self.blasts.judged])
         if self.engine.needs_calibration:
