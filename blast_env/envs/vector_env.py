@@ -182,6 +182,16 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         infos = self._information(self._all) | final
         return self._observe(self._all), rewards, terminated, truncated, infos
 
+    @property
+    def finish(self) -> Any:
+        """The action that finishes one of them."""
+        return self.one.finish
+
+    @property
+    def suggestions(self) -> tuple[str, ...]:
+        """What the actions of `"suggestion"` place, as of `BlastBarrierEnv`."""
+        return self.one.suggestions
+
     def action_masks(self) -> BoolArray:
         """Return the masks of actions that are legal now, (environments, actions).
 

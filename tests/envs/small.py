@@ -130,6 +130,8 @@ def batch_as_singles(**options: Any) -> gym.vector.VectorEnv:
     )
     assert batch.action_space == singles.action_space
     assert batch.single_observation_space == singles.single_observation_space
+    assert {batch.unwrapped.suggestions} == {*singles.get_attr("suggestions")}  # type: ignore[attr-defined]
+    assert all(same(batch.unwrapped.finish, its) for its in singles.get_attr("finish"))  # type: ignore[attr-defined]
     assert same(batch.reset(seed=5)[0], singles.reset(seed=5)[0])
     batch.action_space.seed(1)
     for _ in range(12):
