@@ -151,6 +151,8 @@ def test_layouts_and_charges_that_do_not_fit_are_refused() -> None:
         simulate(COURTYARD, [(0, 99)])
     with pytest.raises(ScenarioError, match="building"):
         simulate(COURTYARD, charge=Charge((29.0, 15.0), 100.0))
+    with pytest.raises(BlastEnvError, match=r"charge is \(5, 12\), must be .* kg of TNT"):
+        simulate(COURTYARD, charge=(5, 12))  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="seed is -1"):
         simulate(COURTYARD, seed=-1)
     with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):

@@ -22,9 +22,12 @@ from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import Risk
+from blast_env.values import whole_number
 
 HIDDEN_THREATS: Final = 8
 """Number of threats for an unknown charge."""
+
+_MOST_BUDGET: Final = 1_000_000_000
 
 
 def propose(
@@ -92,7 +95,9 @@ def search(
         scenario, charge, engine, cache, threats=threats, seed=seed, processes=processes
     )
     proposer = find_proposer(method, tuple(tuple(layout) for layout in initial))
-    blasts = proposer_row(method).budget if budget is None else budget
+    blasts = proposer_row(method).budget
+    if budget is not None:
+        blasts = whole_number("budget", budget, 0, _MOST_BUDGET)
     return proposer.propose(problem, blasts, seed, report)
 
 

@@ -25,7 +25,7 @@ from blast_env.site import (
 )
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import MeanRisk, Risk, WorstRisk
-from blast_env.site.sources import ranked
+from blast_env.site.sources import charge_from, ranked
 from blast_env.values import checked_seed, generator
 
 
@@ -58,16 +58,7 @@ class LoadCase:
     def __post_init__(self) -> None:
         """Convert the values to plain Python numbers, so that they can be hashed and written."""
         object.__setattr__(self, "seed", checked_seed(self.seed, "seed"))
-        if isinstance(self.charge, VehicleCharge):
-            return
-        try:
-            (x_m, y_m), tnt_kg, *height_m = self.charge
-            charge = Charge((float(x_m), float(y_m)), float(tnt_kg), *map(float, height_m))
-        except (TypeError, ValueError):
-            raise BlastEnvError(
-                f"charge is {self.charge!r}, must be ((x, y) in m, kg of TNT)"
-            ) from None
-        object.__setattr__(self, "charge", charge)
+        object.__setattr__(self, "charge", charge_from(self.charge))
 
     def charge_against(self, scenario: AnyScenario, layout: Sequence[Element] = ()) -> Charge:
         """Return the charge at its place with a layout, which matters for vehicles only."""
@@ -209,7 +200,7 @@ class LoadCaseSet:
         if not self.threats:
             raise BlastEnvError("threats: there are none, must be at least one")
         if self.charge is not None:
-            object.__setattr__(self, "charge", LoadCase(self.charge).charge)
+            object.__setattr__(self, "charge", charge_from(self.charge))
             self.scenario.check_charge(self.charge)
         charges = self.charges
         for index, threat in enumerate(self.threats):

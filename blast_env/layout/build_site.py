@@ -11,6 +11,7 @@ from blast_env.layout.placement import LayoutState, LegalLayout, check_layout, u
 from blast_env.site import AnyCharge, Scenario, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import BlastSite, Charge, Gauge
 from blast_env.site.content import highest_top_m
+from blast_env.site.sources import charge_from
 from blast_env.site.structures import (
     BARRIER_NAME,
     ConcreteSquareSection,
@@ -125,9 +126,12 @@ def build_site(
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
         ScenarioError: If the charge is not clear of a structure or the border.
+        BlastEnvError: If the charge has another form.
         ValueError: If the seed is negative.
     """
     legal = check_layout(scenario, layout)
+    if charge is not None and not isinstance(charge, Charge):
+        charge = charge_from(charge)
     # The scenario and the layout are sound with the scenario's own charges, and a vehicle keeps
     # clear of all obstacles: only a charge from elsewhere is checked here.
     if isinstance(charge, Charge) and not scenario.may_have(charge):

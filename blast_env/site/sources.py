@@ -7,8 +7,9 @@ from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import Field, StrictFloat, model_validator
+from pydantic import Field, StrictFloat, ValidationError, model_validator
 
+from blast_env.documents import described
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import TOLERANCE_M
 from blast_env.sections import Coordinate, Ground, HashMark, Name, PointM, Section
@@ -273,9 +274,38 @@ AnyCharge = Charge | VehicleCharge
 """A charge at a place, or one in a vehicle, with a place that depends on the layout."""
 
 
+def charge_from(given: Any) -> AnyCharge:
+    """Return a charge in plain Python numbers, which can be hashed and written.
+
+    Args:
+        given: A charge, ((x, y) in m, kg of TNT), with or without a height in m; or that of a
+            vehicle.
+
+    Raises:
+        BlastEnvError: If it has another form.
+    """
+    if isinstance(given, VehicleCharge):
+        return given
+    try:
+        (x_m, y_m), tnt_kg, *height_m = given
+        return Charge((float(x_m), float(y_m)), float(tnt_kg), *map(float, height_m))
+    except (TypeError, ValueError):
+        raise BlastEnvError(f"charge is {given!r}, must be ((x, y) in m, kg of TNT)") from None
+
+
 def source_of(charge: AnyCharge) -> AnySource:
-    """Return the source of a single charge: a point, or the vehicle."""
-    return charge.source if isinstance(charge, VehicleCharge) else PointSource.at(charge)
+    """Return the source of a single charge: a point, or the vehicle.
+
+    Raises:
+        BlastEnvError: If it is no charge, or out of bounds.
+    """
+    plain = charge if isinstance(charge, Charge | VehicleCharge) else charge_from(charge)
+    if isinstance(plain, VehicleCharge):
+        return plain.source
+    try:
+        return PointSource.at(plain)
+    except ValidationError as error:
+        raise BlastEnvError(f"charge: {described(error)}") from error
 
 
 def ranked(charges: Iterable[AnyCharge]) -> tuple[AnyCharge, ...]:

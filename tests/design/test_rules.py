@@ -259,6 +259,10 @@ def test_what_makes_no_sense_is_an_error() -> None:
         line_of_sight_wall(load_scenario("free_field"), WEST)
     with pytest.raises(BlastEnvError, match="there is no line of sight"):
         line_of_sight_wall(site(), Charge(BUILDING_M, 100.0))
+    with pytest.raises(BlastEnvError, match=r"charge: position_m\[0\] is -5"):
+        line_of_sight_wall(site(), Charge((-5.0, 20.5), 100.0))
+    with pytest.raises(BlastEnvError, match=r"charge is \(5, 12\), must be .* kg of TNT"):
+        line_of_sight_wall(site(), (5, 12))  # type: ignore[arg-type]
 
 
 # ---

@@ -1,12 +1,14 @@
 """Search: what is asked and what it costs, neighbours and crossovers."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import blast_env
 from blast_env import load_scenario
 from blast_env.design.search import (
     Layout,
@@ -178,6 +180,12 @@ def test_problems_that_are_no_use_are_refused(
     evaluator = BlastEvaluator(scenario, "event")
     with pytest.raises(BlastEnvError, match=words):
         DesignProblem(evaluator, LoadCaseSet(scenario, threats, realisations=len(threats)))
+
+
+@pytest.mark.parametrize("budget", [-1, 2.5])
+def test_a_budget_is_a_number_of_blasts(budget: Any) -> None:
+    with pytest.raises(BlastEnvError, match=f"budget is {budget}, must be an integer from 0"):
+        blast_env.search(small_scenario(), "random", budget, engine="event")
 
 
 def test_questions_that_are_no_use_are_refused(problem: DesignProblem) -> None:
