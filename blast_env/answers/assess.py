@@ -257,13 +257,16 @@ def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Itera
     """Yield the largest masses and the least stand-offs, one row per layout and place."""
     masses, stand_offs = list[tuple[str, ...]](), list[tuple[str, ...]]()
     for own in found:
-        x_m, y_m = own.charge.position_m
-        place = own.layout, f"{x_m:.1f}, {y_m:.1f}"
+        (x_m, y_m), _, height_m = own.charge
+        high = f", {height_m:g} high" if height_m else ""
+        place = own.layout, f"{x_m:.1f}, {y_m:.1f}{high}"
         masses.append((*place, f"{own.stand_off_m:.1f} m", *map(_mass_text, own.heavier)))
         mass = f"{own.charge.tnt_kg:g} kg"
         stand_offs.append((*place, mass, *map(_stand_off_text, own.nearer)))
     blasts = sum(own.blasts for own in found)
     yield Line.of(f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass")
+    notes = Consequences.together(own.judged for own in found).notes
+    yield from lines((f"flag: {note}" for note in notes), "flag")
     keeps = "that keeps each level of protection"
     levels = [level.label for level in LEVELS]
     for title, third, rows in (

@@ -182,3 +182,5 @@ def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.Mon
     rows = [line.split() for line in output.splitlines() if "2.0, 4.0" in line]
     assert len(rows) == 4
     assert "largest charge (kg TNT) that keeps each level of protection" in output
+    (flag,) = (line for line in output.splitlines() if line.startswith("flag: hut: "))
+    assert "cells per m/kg^(1/3), checked from 9.2" in flag  # 0.1 kg on cells of 0.5 m

@@ -35,6 +35,7 @@ LEVELS: Final = tuple(LevelOfProtection)[1:]
 
 _STEP: Final = MASS_RANGE**2
 _BISECTIONS: Final = 6
+_NOTHING: Final = Consequences(())
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,16 @@ class Ladder:
     @property
     def blasts(self) -> int:
         """Number of blasts so far."""
-        return sum(blast is not None for blast in self._blasts.values())
+        return len(self._found)
+
+    @property
+    def judged(self) -> Consequences:
+        """The consequences of all blasts so far."""
+        return Consequences.together(self._found)
+
+    @property
+    def _found(self) -> list[Consequences]:
+        return [blast for blast in self._blasts.values() if blast is not None]
 
     def charge_at(self, severity: float, nearer: bool) -> Charge:
         """Return the charge that is as severe as a multiple of the mass at the same place.
@@ -192,6 +202,7 @@ class PlaceCapacity:
         heavier: The largest mass for each level, the lowest first.
         nearer: The least stand-off for each level.
         blasts: Number of blasts that ran for it.
+        judged: Their consequences.
     """
 
     layout: str
@@ -200,6 +211,7 @@ class PlaceCapacity:
     heavier: tuple[Edge, ...]
     nearer: tuple[Edge, ...]
     blasts: int
+    judged: Consequences = _NOTHING
 
 
 def capacity(
@@ -227,7 +239,8 @@ def capacity(
         heavier = tuple(ladder.edge(level) for level in LEVELS)
         nearer = tuple(ladder.edge(level, nearer=True) for level in LEVELS)
         off_m = stand_off_m(evaluator.scenario.loaded_walls, there.position_m)
-        found.append(PlaceCapacity(name, there, off_m, heavier, nearer, ladder.blasts))
+        ran = ladder.blasts, ladder.judged
+        found.append(PlaceCapacity(name, there, off_m, heavier, nearer, *ran))
         if progress is not None:
             progress(done / len(pairs))
     return tuple(found)
