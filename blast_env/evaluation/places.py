@@ -132,4 +132,5 @@ def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
 
 
 def _protected(scenario: Scenario) -> list[Rectangle]:
-    return [structure.rectangle_m for structure in scenario.structures if structure.protected]
+    structures = (structure for structure in scenario.structures if structure.protected)
+    return [box_m for structure in structures for box_m in structure.boxes_m]

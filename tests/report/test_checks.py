@@ -5,8 +5,10 @@ import re
 import pytest
 
 from blast_env.answers import Line
-from blast_env.answers.report import Report, report_document
+from blast_env.answers.report import Report, StudyOptions, report_document, run_report
 from blast_env.curves import kingery_bulmash
+from blast_env.site import Charge, Scenario
+from tests.gas_sites import WALL, site_document
 
 
 def test_a_reviewer_who_repeats_the_checks_finds_the_same(report: Report) -> None:
@@ -33,3 +35,18 @@ def test_a_reviewer_who_repeats_the_checks_finds_the_same(report: Report) -> Non
     assert impulse[2].endswith(f"{total} Pa s")
     assert "factor 4" in pane[1]
     assert cost[-1] == "sum 4; cost of the layout 4"
+
+
+def test_the_stand_off_is_that_of_a_building_with_a_load() -> None:
+    """The shed is nearer, but no air touches the only wall of it that counts."""
+    document = site_document()
+    hut = document["structures"][0]
+    shed = {"name": "shed", "corner_m": [8.0, 3.0], "columns": 2, "faces": ["west"]}
+    document["structures"].append(hut | shed)
+    charges = (Charge((9.5, 6.0), 1.0),)
+    options = StudyOptions(cells=(0.5, 0.5), items=False, places=1, charges=charges)
+    scenario = Scenario.from_document(document, "two")
+    document_of = report_document(run_report(scenario, WALL[:2], options))
+    lines = [part.text() for part in document_of.parts if isinstance(part, Line)]
+    (words,) = (line for line in lines if " from the outline of " in line)
+    assert words.endswith("1.80 m from the outline of hut")

@@ -67,6 +67,17 @@ def test_no_place_of_a_street_is_nearer_than_those_looked_at(
     assert looked_at_m == pytest.approx(nearest, abs=0.01)
 
 
+def test_the_nearest_place_is_near_the_walls_of_a_polygon_not_its_notch() -> None:
+    document = site_document(charge=[ROAD | {"start_m": [1.0, 5.5], "end_m": [7.0, 5.5]}])
+    corners = [(5.0, 2.0), (9.0, 2.0), (9.0, 6.0), (8.0, 6.0), (8.0, 3.0), (5.0, 3.0)]
+    keys = {"kind": "polygon", "name": "angle", "height_m": 2.0, "protected": True}
+    document["structures"] = [keys | {"outline_m": corners}]
+    del document["build_zone"]
+    site = Scenario.from_document(document, "angle")
+    places = [place.charge_against(site).position_m for place in other_places(site, 1)]
+    assert places == [(4.0, 5.5), (7.0, 5.5)]
+
+
 def test_other_places_are_spread_over_every_source() -> None:
     site = site_with(ROAD, YARD, ROAD)
     places = other_places(site, 3)

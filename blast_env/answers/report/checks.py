@@ -8,7 +8,6 @@ import numpy as np
 from blast_env.answers.document import AnyPart, Line, Section, lines
 from blast_env.curves import CURVES_SCALED_M, Load, air_share, normally_reflected
 from blast_env.evaluation.study import Study
-from blast_env.geometry import Rectangle
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import LayoutState
 from blast_env.response.components import Glazing
@@ -43,15 +42,15 @@ def _check(title: str, texts: Iterable[str]) -> Iterator[AnyPart]:
 def _stand_off(study: Study) -> Iterator[AnyPart]:
     threat, scenario = study.threats[0], study.scenario
     charge = threat.charge_against(scenario)
-    # 1. The nearest protected building, by its outline in plan.
-    outlines = {
-        name: Rectangle.around([part.rectangle_m for part in parts])
-        for name, parts in buildings_of(scenario.structures).items()
-        if any(part.protected for part in parts)
-    }
+    # 1. The nearest protected building with a load, by its outline in plan.
+    known = study.buildings(protected=True)
     distances_m = {
-        name: outline.distance_to(charge.position_m) for name, outline in outlines.items()
+        name: min(box.distance_to(charge.position_m) for part in parts for box in part.boxes_m)
+        for name, parts in buildings_of(scenario.structures).items()
+        if name in known
     }
+    if not distances_m:
+        return
     building = min(distances_m, key=distances_m.__getitem__)
     away_m = distances_m[building]
     # 2. The scaled distance; 3. the curves there, if they reach so far; 4. beside the load by gas
@@ -80,7 +79,7 @@ def _stand_off(study: Study) -> Iterator[AnyPart]:
             f" {load.wall_impulse_pa_s:,.0f} Pa s; largest peak {load.peak_pa / PA_PER_KPA:,.1f}"
             " kPa",
         ]
-    return _check("Stand-off and load in the open: UFC 3-340-02, chapter 2", texts)
+    yield from _check("Stand-off and load in the open: UFC 3-340-02, chapter 2", texts)
 
 
 def _of_facade(facade: FacadeResponse) -> Iterator[Iterator[AnyPart]]:
