@@ -14,6 +14,7 @@ from blast_env.answers.document import (
     Table,
     building_words,
     charge_text,
+    height_words,
     left_out_words,
     lines,
     without_facade_words,
@@ -258,8 +259,7 @@ def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Itera
     masses, stand_offs = list[tuple[str, ...]](), list[tuple[str, ...]]()
     for own in found:
         (x_m, y_m), _, height_m = own.charge
-        high = f", {height_m:g} high" if height_m else ""
-        place = own.layout, f"{x_m:.1f}, {y_m:.1f}{high}"
+        place = own.layout, f"{x_m:.1f}, {y_m:.1f}{height_words(height_m)}"
         masses.append((*place, f"{own.stand_off_m:.1f} m", *map(_mass_text, own.heavier)))
         mass = f"{own.charge.tnt_kg:g} kg"
         stand_offs.append((*place, mass, *map(_stand_off_text, own.nearer)))

@@ -304,8 +304,12 @@ def titled(name: str, title: str) -> str:
 def charge_text(charge: Charge) -> str:
     """Return a charge in words: `100 kg at (2, 4) m`, `20 kg at (2, 4) m, 1.5 m high`."""
     x_m, y_m = charge.position_m
-    high = f", {charge.height_m:g} m high" if charge.height_m else ""
-    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m{high}"
+    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m{height_words(charge.height_m)}"
+
+
+def height_words(height_m: float) -> str:
+    """Return the height of a charge in words, `, 1.5 m high`; empty for one on the ground."""
+    return f", {height_m:g} m high" if height_m else ""
 
 
 def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from blast_env.answers.document import (
     Number,
     Table,
     building_words,
+    height_words,
     interval,
     left_out_words,
     lines,
@@ -51,7 +52,8 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     worst = found.worst
     yield Line.of(
         f"worst threat: {worst.charge.tnt_kg:g} kg TNT at ({worst.charge.position_m[0]:.2f}, "
-        f"{worst.charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: ",
+        f"{worst.charge.position_m[1]:.2f}) m{height_words(worst.charge.height_m)}, "
+        f"seed {worst.threat.seed}: ",
         Number.load(scenario.objective, worst.load),
         ", reduction ",
         Number.reduction(worst.reduction),

@@ -85,6 +85,6 @@ def test_the_end_of_the_ladder_is_a_bound() -> None:
     raised = replace(place, charge=CHARGE._replace(height_m=1.5))
     _, high, _ = capacity_answer(glazed_hut(), [raised])
     assert isinstance(high, Table)
-    assert high.cells()[0][1] == "2.0, 4.0, 1.5 high"
+    assert high.cells()[0][1] == "2.0, 4.0, 1.5 m high"
     assert masses.cells() == [("wall", "2.0, 4.0", "4.0 m", ">= 0.1", "< 0.1", "0.1", "0.1")]
     assert stand_offs.cells() == [("wall", "2.0, 4.0", "0.1 kg", "<= 4.0", "> 4.0", "4.0", "4.0")]

@@ -4,7 +4,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isnan
 from typing import Any, Final
 
-from blast_env.answers.document import AnyCell, AnyPart, Line, Number, Picture, Section, Table
+from blast_env.answers.document import (
+    AnyCell,
+    AnyPart,
+    Line,
+    Number,
+    Picture,
+    Section,
+    Table,
+    height_words,
+)
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.study import Study, gas_of
@@ -47,7 +56,10 @@ def _meaning(study: Study) -> Iterator[AnyPart]:
 def _threats(study: Study) -> Iterator[AnyPart]:
     for number, threat in enumerate(study.threats):
         place = place_text(threat, study.scenario, study.layout)
-        yield Line.of(f"{threat.name}: {threat.charge.tnt_kg:g} kg TNT at {place}", kind="head")
+        high = height_words(threat.charge.height_m)
+        yield Line.of(
+            f"{threat.name}: {threat.charge.tnt_kg:g} kg TNT at {place}{high}", kind="head"
+        )
         rows: list[tuple[AnyCell, ...]] = []
         main, statuses = list[int](), list[str]()
         for name in study.buildings(protected=True):

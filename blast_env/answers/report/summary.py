@@ -10,6 +10,7 @@ from blast_env.answers.document import (
     Number,
     Section,
     Table,
+    height_words,
     lines,
     percent,
     without_facade_words,
@@ -34,7 +35,7 @@ def charge_words(study: Study) -> str:
     """Return the threats in words, each with its mass and its places."""
     return "; ".join(
         f"{threat.name}, {threat.charge.tnt_kg:g} kg TNT at "
-        f"{place_text(threat, study.scenario, study.layout)}"
+        f"{place_text(threat, study.scenario, study.layout)}{height_words(threat.charge.height_m)}"
         for threat in study.threats
     )
 
