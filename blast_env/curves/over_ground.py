@@ -66,7 +66,10 @@ class Ways(NamedTuple):
             # The image in a rigid ground lies as deep as the charge is high.
             way_m = np.array([*charge_m[:2], height_m]) - places_m
             away_m: FloatArray = np.linalg.norm(way_m, axis=-1)
-            return away_m, (way_m * outward).sum(axis=-1) / away_m
+            # A place right at the charge faces it.
+            cosine = np.ones(away_m.shape)
+            np.divide((way_m * outward).sum(axis=-1), away_m, out=cosine, where=away_m > 0.0)
+            return away_m, cosine
 
         own, mirrored = way(charge_m[2]), way(-charge_m[2])
         return cls(*own, *mirrored, (places_m[..., 2] + charge_m[2]) / mirrored[0], seen)

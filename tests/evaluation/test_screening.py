@@ -359,6 +359,17 @@ def test_a_charge_against_a_wall_counts_up_to_twice_its_mass_and_says_so() -> No
         assert "a charge that stands against the wall" in bay.unknown
 
 
+def test_a_charge_right_before_the_middle_of_a_bay_has_a_load() -> None:
+    """At the very place at which the load of the bay is worked out."""
+    site = yard(position_m=[29.5, 15.5], height_m=1.75)
+    for atlas in (None, packaged_laws()):
+        (threat,) = screen(site, (), (), atlas).threats
+        assert threat.nearest_m == 0.0
+        loads = [(bay.peak_pa, bay.impulse_pa_s) for bay in threat.bays]
+        assert np.isfinite(loads).all()
+        assert not threat.keeps(LOW)
+
+
 def test_a_charge_beyond_the_end_of_a_wall_does_not_stand_against_it() -> None:
     """Half a metre before the line of the wall: 1.5 m from it, and 6 m beyond its end."""
     for y_m, is_against in ((13.0, True), (8.0, False)):
