@@ -29,7 +29,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
 from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
-from blast_env.layout import LayoutState
+from blast_env.layout import LayoutState, kept_clear
 from blast_env.layout.batch import LayoutBatch, PlacementRules
 from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
@@ -272,7 +272,7 @@ class PackagedAgent:
         Raises:
             BlastEnvError: As for `propose`, or if a number is out of bounds.
         """
-        found = find_scenario(scenario)
+        found = kept_clear(find_scenario(scenario), charge)
         guesses = Guesses.of(packaged_surrogate(), case_for(found, charge))
         rules = layouts_by_rule(found, charge)
         known = [(), *(tuple(sorted(layout)) for layout in rules.values())]

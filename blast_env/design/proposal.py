@@ -19,6 +19,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import one_per_charge, search_set
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Layout
+from blast_env.layout import kept_clear
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import Risk
@@ -116,7 +117,8 @@ def search_problem(
 
     `risk` is the risk measure over the charges; that of the scenario's objective unless given.
     """
-    evaluator = BlastEvaluator(scenario, engine, cache=cache)
+    site = kept_clear(find_scenario(scenario), charge)
+    evaluator = BlastEvaluator(site, engine, cache=cache)
     known = "hidden" if charge is None else "visible"
     realisations = find_realisations(None, known, evaluator.engine)
     case = search_set(evaluator.scenario, charge, realisations, seed, risk, charges=threats)
@@ -133,7 +135,7 @@ def problem_of(
 
     A charge with a single possible place is known, whether it is given or not.
     """
-    found = find_scenario(scenario)
+    found = kept_clear(find_scenario(scenario), charge)
     only = found.charge[0]
     if charge is None and len(found.charge) == 1 and isinstance(only, PointSource):
         charge = Charge(only.position_m, only.tnt_kg, only.height_m)

@@ -15,7 +15,13 @@ from blast_env.lazy import on_first_use
 
 if TYPE_CHECKING:
     from blast_env.layout.files import LayoutFile, load_layout, write_layout
-    from blast_env.layout.placement import LayoutState, check_layout, load_relevant, usable_cells
+    from blast_env.layout.placement import (
+        LayoutState,
+        check_layout,
+        kept_clear,
+        load_relevant,
+        usable_cells,
+    )
 else:
     __getattr__, __dir__ = on_first_use(__name__)
 
@@ -27,6 +33,7 @@ __all__ = [
     "check_layout",
     "draw_charge",
     "draw_threat",
+    "kept_clear",
     "load_layout",
     "load_relevant",
     "usable_cells",

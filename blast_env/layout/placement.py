@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece
+from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue, ModulePlace, cell_text, element_text
 from blast_env.site.models import AnyScenario, Scenario, find_scenario
+from blast_env.site.sources import AnyCharge, charge_from
 from blast_env.site.zone import (
     NO_ZONE,
     BuildZone,
@@ -504,6 +506,27 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
         An array of shape (rows, columns), read-only; (0, 0) without a build zone.
     """
     return LayoutState.empty(scenario).usable
+
+
+def kept_clear(scenario: Scenario, charge: AnyCharge | None) -> Scenario:
+    """Return a scenario on whose site no piece can be placed on a known charge, either.
+
+    It is the scenario itself, unless a charge from elsewhere takes cells of the build zone.
+
+    Args:
+        scenario: The scenario; its possible charges are kept clear in any case.
+        charge: The charge; `None` for one of the possible ones.
+
+    Raises:
+        ScenarioError: If the charge is out of bounds, or not clear of a structure or the border.
+        BlastEnvError: If it has another form.
+    """
+    known = None if charge is None else charge_from(charge)
+    if not isinstance(known, Charge) or scenario.may_have(known):
+        return scenario
+    with_it = scenario.with_possible_charges((known,))
+    takes_none = np.array_equal(usable_cells(with_it), usable_cells(scenario))
+    return scenario if takes_none else with_it
 
 
 def load_relevant(layout: Iterable[Element]) -> Layout:

@@ -18,6 +18,7 @@ from blast_agents.packaged import (
 from blast_agents.policies.candidates import Candidates
 from typer.testing import CliRunner
 
+import blast_env
 from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.design.proposal import problem_of
@@ -134,6 +135,18 @@ def test_what_it_cannot_serve_is_refused() -> None:
     for count in (0, 2.5, True):
         with pytest.raises(BlastEnvError, match="count is"):
             packaged_agent().sample(CONTROL_ROOM, count=count)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("x_m", [8.0, 9.0])
+def test_nobody_proposes_to_stand_on_a_known_charge_from_elsewhere(x_m: float) -> None:
+    charge = Charge((x_m, 8.5), 100.0)
+    with_it = CONTROL_ROOM.with_possible_charges([charge])
+    agent = packaged_agent()
+    layouts = [agent.propose(CONTROL_ROOM, charge), *agent.sample(CONTROL_ROOM, charge)]
+    layouts.append(blast_env.propose(CONTROL_ROOM, charge).layout)
+    search = blast_env.search(CONTROL_ROOM, "random", 12, charge=charge, engine="surrogate")
+    for layout in (*layouts, search.layout):
+        assert LayoutState.of(with_it, layout).layout == layout
 
 
 def test_weights_come_back_from_their_file(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.design.search.learnt import case_for
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Rectangle
-from blast_env.layout import LayoutState
+from blast_env.layout import LayoutState, kept_clear
 from blast_env.layout.build_site import vehicle_reach
 from blast_env.rules import RULES, line_of_posts, posts_and_wall
 from blast_env.site import AnyCharge, Scenario
@@ -180,6 +180,7 @@ class Candidates:
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
         """
+        scenario = kept_clear(scenario, charge)
         zone, empty = scenario.zone, LayoutState.empty(scenario)
         walls = _protected_walls(scenario)
         threats = case_for(scenario, charge).threats
