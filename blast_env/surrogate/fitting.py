@@ -46,7 +46,7 @@ _AT_POINTS: Final = 1.0
 """Weight of the errors at points, where loads there are known, beside those of their means."""
 
 _RATE: Final = 1e-2
-_DECAY: Final = 1e-3
+_DECAY: Final = 2e-2
 _MOST_GRADIENT: Final = 1.0
 """Bound on the norm of a gradient, against outliers among the groups."""
 

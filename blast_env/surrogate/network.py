@@ -27,7 +27,13 @@ from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.layers import SingleArray, two_layers
-from blast_env.surrogate.loads import NetworkLayers, Scales, mean_and_spread
+from blast_env.surrogate.loads import (
+    LEAST_OVER,
+    MOST_OVER,
+    NetworkLayers,
+    Scales,
+    mean_and_spread,
+)
 from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
 from blast_env.surrogate.relations import RELATIONS
@@ -279,7 +285,7 @@ class Networks:
             both, layers.first, layers.first_bias, layers.second, layers.second_bias
         )
         found: FloatArray = np.einsum("mpi,mi->mp", second, layers.last[..., 0])
-        return found + layers.last_bias
+        return np.clip(found + layers.last_bias, LEAST_OVER, MOST_OVER)
 
     def layers(self, kind: int, power: float) -> NetworkLayers:
         """Return the layers as compiled code takes them.
