@@ -229,6 +229,24 @@ def test_masses_by_name_and_by_explosive() -> None:
             MassPreset.parsed(wrong)
 
 
+def test_a_given_mass_is_a_threat_at_each_height_of_the_site_s_charges() -> None:
+    """All places had the height of the first source, and a raised one a load far too low."""
+    document = yard().model_dump(mode="json", exclude_none=True)
+    (low,) = document["charge"]
+    high = low | {"height_m": 1.2}
+    car = MassPreset("car", 5.0)
+
+    def peaks_pa(*sources: dict[str, object]) -> dict[str, float]:
+        site = Scenario.from_document(document | {"charge": sources}, "heights")
+        found = screen(site, (), [car]).threats
+        return {own.name: max(bay.peak_pa for bay in own.bays) for own in found}
+
+    alone = peaks_pa(low) | peaks_pa(high)
+    assert [*alone] == ["car", "car, 1.2 m high"]
+    assert alone["car, 1.2 m high"] > 1.2 * alone["car"]
+    assert peaks_pa(low, high) == peaks_pa(high, low) == alone
+
+
 def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     with pytest.raises(BlastEnvError, match="--glazing"):
         screen(hut())

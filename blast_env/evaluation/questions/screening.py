@@ -545,23 +545,27 @@ def _wholly_covered(
 
 
 def _by_threat(scenario: Scenario, named: Sequence[MassPreset]) -> dict[str, tuple[AnySource, ...]]:
-    """Return the sources of each threat: all of the site's, or those of one mass and height."""
-    if named:
-        return {
-            own.name: tuple(
-                source.model_copy(update={"tnt_kg": own.tnt_kg}) for source in scenario.charge
-            )
-            for own in named
-        }
+    """Return the sources of each threat: all of one mass and height, given or of the site."""
     found: dict[str, tuple[AnySource, ...]] = {}
-    for source in scenario.charge:
-        mass = f"{source.tnt_kg:g} kg"
+    for called, source in _named_sources(scenario, named):
         high = f", {source.height_m:g} m high" if source.height_m else ""
-        alike = {part.tnt_kg for part in scenario.charge if part.threat == source.threat}
-        called = source.threat or mass
-        name = f"{called}{high}" if len(alike) == 1 or called == mass else f"{called}, {mass}{high}"
+        name = f"{called}{high}"
         found[name] = (*found.get(name, ()), source)
     return found
+
+
+def _named_sources(
+    scenario: Scenario, named: Sequence[MassPreset]
+) -> Iterator[tuple[str, AnySource]]:
+    """Yield each source with the name of its mass: with each given mass, else with its own."""
+    for own in named:
+        for source in scenario.charge:
+            yield own.name, source.model_copy(update={"tnt_kg": own.tnt_kg})
+    for source in () if named else scenario.charge:
+        mass = f"{source.tnt_kg:g} kg"
+        alike = {part.tnt_kg for part in scenario.charge if part.threat == source.threat}
+        called = source.threat or mass
+        yield called if len(alike) == 1 or called == mass else f"{called}, {mass}", source
 
 
 def _places(
