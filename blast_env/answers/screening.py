@@ -30,7 +30,6 @@ _STAND_OFFS: Final = (
 )
 _AROUND: Final = ("threat", "bays", "surroundings", "factor of the impulse", "largest of them")
 _LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
-_FEW: Final = 3  # names of bays in a sentence
 
 
 def screening_answer(
@@ -56,7 +55,7 @@ def screening_answer(
     behind = layout_counts(layout, "barrier") if layout else "no barrier"
     title = f"{scenario.name}, {behind}: worst place by damage"
     yield Table.of(title, _THREATS, rows, 2)
-    yield from lines((*without_facade_words(scenario), *_covered_words(found)), "flag")
+    yield from lines(without_facade_words(scenario), "flag")
     for threat in found.threats:
         if threat.may_be_low:
             yield Line.of(_low_words(threat), kind="flag")
@@ -91,16 +90,6 @@ def _threat_row(
         *threat.words,
         Verdict.of(kept).word().lower() + threat.doubts(required),
     )
-
-
-def _covered_words(found: Screening) -> Iterator[str]:
-    """Yield that bays are left out, with some of their names."""
-    if found.covered:
-        few = ", ".join(found.covered[:_FEW]) + (", ..." if len(found.covered) > _FEW else "")
-        yield (
-            f"{count_of('bay', len(found.covered))} left out, before whose middle a structure or a"
-            f" piece stands ({few}): no verdict covers what is free of them; a blast by gas does"
-        )
 
 
 def _low_words(threat: ThreatScreening) -> str:

@@ -204,8 +204,6 @@ class Screening:
         present: Names of the components in the site's bays.
         parts: The panes and panels of the site's bays, each once, of the sizes that they have.
         storey_m: The most frequent height of a storey, the span of walls.
-        covered: Names of the bays before whose middle a structure or a piece stands; they are in no
-            threat. Those that touch another building with all of their area are not named.
         knows_surroundings: Whether the atlas changed the loads.
     """
 
@@ -214,7 +212,6 @@ class Screening:
     present: frozenset[str]
     parts: tuple[Pane | Panel, ...]
     storey_m: float
-    covered: tuple[str, ...] = ()
     knows_surroundings: bool = True
 
     @property
@@ -284,8 +281,8 @@ def screen(
     facade = _Facade.of(scenario, layout, bays)
     if not facade.bays:
         raise BlastEnvError(
-            f"scenario {scenario.name!r}: a structure or a piece of the layout stands before the"
-            f" middle of each bay ({bays[0].bay.name} and so on): no bay can be screened"
+            f"scenario {scenario.name!r}: other structures stand before all of each bay"
+            f" ({bays[0].bay.name} and so on): no bay can be screened"
         )
     changed = None if atlas is None else SiteAtlas(facade.site, facade.walls, atlas)
     screened = []
@@ -306,7 +303,6 @@ def screen(
         ),
         _parts_of(bays),
         max(set(storeys), key=storeys.count),
-        facade.covered,
         atlas is not None,
     )
 
@@ -414,8 +410,8 @@ class _Facade:
         ends_m: Distances of the middles from the ends of the wall on the right and on the left
             (bays, 2).
         site: The site with a charge that does not count.
-        covered: Names of the bays that are left out because a structure or a piece covers their
-            middle, without those that structures cover wholly.
+        covered: Whether a structure or a piece stands before the middle of each bay, not before all
+            of it (bays,).
     """
 
     bays: tuple[FacadeBay, ...]
@@ -423,22 +419,20 @@ class _Facade:
     outward: FloatArray
     ends_m: FloatArray
     site: BlastSite
-    covered: tuple[str, ...]
+    covered: BoolArray
 
     @classmethod
     def of(
         cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FacadeBay]
     ) -> "_Facade":
-        """Return the bays that no structure covers."""
+        """Return the bays that structures do not cover wholly."""
         rectangles_m = {structure.name: structure.rectangle_m for structure in scenario.structures}
         middles_m, normals = bay_middles(rectangles_m, [own.bay for own in bays])
         before_m = middles_m + MODULE_SIDE_M * normals
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
-        free = ~_covered(site, before_m)
+        free = ~_wholly_covered(site, bays, before_m, normals)
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
-        hidden = ~free & ~_wholly_covered(site, bays, before_m, normals)
-        covered = tuple(bays[index].bay.name for index in np.flatnonzero(hidden).tolist())
-        ends_m = _ends_m(bays, normals)[free]
+        covered, ends_m = _covered(site, before_m[free]), _ends_m(bays, normals)[free]
         return cls(kept, before_m[free], normals[free], ends_m, site, covered)
 
     @property
@@ -489,8 +483,14 @@ class _Facade:
         return Ways(*(np.stack(own) for own in zip(*found, strict=True)))
 
     def sees(self, place: Charge) -> BoolArray:
-        """Return whether each bay is in sight of a place (bays,)."""
-        return in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
+        """Return whether each bay is in sight of a place (bays,).
+
+        What stands before the middle of a bay hides a part of it, which takes nothing off.
+        """
+        way_m = np.array([*place.position_m, place.height_m]) - self.middles_m
+        faces = (way_m * self.outward).sum(axis=1) > 0.0
+        seen = in_sight(replace(self.site, charge=place), self.middles_m, self.outward)
+        return np.asarray(seen | (faces & self.covered))
 
 
 def _ends_m(bays: Sequence[FacadeBay], outward: FloatArray) -> FloatArray:
