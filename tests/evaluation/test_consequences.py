@@ -80,15 +80,31 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -
     """5 kg on cells of 0.5 m."""
     below = LevelOfProtection.BELOW_STANDARDS
     assert found.verdict_word(below) == "COMPLIES (flagged)"
-    assert replace(found, unchecked=()).is_flagged == any(
-        not case for case in found.responses[0].known.values()
-    )
-    unprotected = Consequences((replace(found.responses[0], known={}),))
+    assert replace(found, unchecked=()).is_flagged
+    # On cells fine enough, and with all loads known, nothing is left to flag.
+    fine = replace(found.responses[0], peak_factor=1.5)
+    is_known = all(case for case in fine.known.values())
+    assert Consequences((fine,)).is_flagged is not is_known
+    unprotected = Consequences((replace(fine, known={}),))
     assert unprotected.verdict_word(below) == "COMPLIES"
     assert unprotected.verdict_word(LevelOfProtection.HIGH) == "DOES NOT COMPLY"
     assert (
         replace(unprotected, unchecked=(("kiosk", "too near"),)).verdict_word(below) == "COMPLIES"
     )
+
+
+def test_a_verdict_on_loads_of_a_charge_above_the_ground_is_flagged(found: Consequences) -> None:
+    """Their validation status is `approximate`, which no note of the engine says."""
+    fine = replace(found.responses[0], peak_factor=1.5, known={})
+    assert fine.site is not None
+    raised = replace(fine, site=replace(fine.site, charge=CHARGE._replace(height_m=1.0)))
+    below = LevelOfProtection.BELOW_STANDARDS
+    words = [Consequences((own,)).verdict_word(below) for own in (fine, raised)]
+    assert words == ["COMPLIES", "COMPLIES (flagged)"]
+    (note,) = Consequences((raised,)).notes
+    count = len(raised.on_cells.bays)
+    assert note.startswith(f"hut: the loads on {count} of {count} bays of all charges are approx")
+    assert "a charge above the ground" in note
 
 
 def test_bending_alone_is_no_verdict_on_a_wall_that_may_be_breached() -> None:

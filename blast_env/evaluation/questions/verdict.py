@@ -18,7 +18,7 @@ In the open the first is exact. The second is within 7 % of Kingery and Bulmash'
 reflected pressure round the edges of a small wall, and coarse cells underestimate peaks.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
@@ -35,7 +35,7 @@ from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.engines.gas_validation import BayPlaces, bay_places, bay_validations
 from blast_env.evaluation.questions.reduction import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.record import BlastRecord, WallLoad, WallsWithoutVerdict
-from blast_env.evaluation.validation import Validation
+from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
@@ -127,6 +127,12 @@ class BuildingResponse:
         assert self.site is not None, "the response was made without a site"
         bays = [bay.bay for bay in self.on_cells.bays]
         return bay_validations(self.site, bays, cells_of(self.peak_factor), self.known)
+
+    @property
+    def doubted(self) -> list[Validation]:
+        """The validation statuses that are approximate or outside; none without a site."""
+        statuses = self.validations if self.site is not None else ()
+        return [own for own in statuses if own.status >= ValidationStatus.APPROXIMATE]
 
     @property
     def rows(self) -> list[dict[str, object]]:
@@ -292,6 +298,7 @@ class Consequences:
             f"range of the engine, e.g. {own[0]}"
             for building, own in reasons.items()
         ]
+        notes += self._doubted([*reasons])
         known = self._known
         if not all(known):
             notes.append(
@@ -299,6 +306,20 @@ class Consequences:
                 " captured at the end of the run"
             )
         return tuple(notes)
+
+    def _doubted(self, named: Collection[str]) -> list[str]:
+        """Return notes on bays whose loads are approximate or outside, but of named buildings."""
+        notes = []
+        for building in self.buildings:
+            responses = self.of(building)
+            own = [status for response in responses for status in response.doubted]
+            if own and building not in named and not any(part.stepped for part in responses):
+                count = sum(len(response.on_cells.bays) for response in responses)
+                notes.append(
+                    f"{building}: the loads on {len(own)} of {count} bays of all charges are"
+                    f" approximate or outside, e.g. {own[0].words}"
+                )
+        return notes
 
     @property
     def _known(self) -> list[bool]:
@@ -331,6 +352,7 @@ class Consequences:
             or bool(self.unjudged or self._thin)
             or any(response.stepped for response in self.responses)
             or not all(self._known)
+            or any(response.doubted for response in self.responses)
         )
 
     def under(self, number: int) -> "Consequences":
