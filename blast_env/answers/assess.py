@@ -86,7 +86,7 @@ def assessment(
     judged_first = [*found.items()][::-1]
     for requirement in required:
         for name, own in judged_first:
-            kept = all(requirement.kept_by(response.facade) for response in own.responses)
+            kept = all(response.keeps(requirement) for response in own.responses)
             word = Verdict.of(kept).word(own.is_flagged).lower()
             yield Line.of(f"{requirement.words}, {name}: {word}")
     error = GridError.of(blasts)

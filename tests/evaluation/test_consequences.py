@@ -22,6 +22,7 @@ from blast_env.geometry import Layout
 from blast_env.response import (
     BuildingDamage,
     LevelOfProtection,
+    Requirement,
     peak_corrected,
     peak_factor,
     respond,
@@ -169,6 +170,17 @@ def test_no_verdict_passes_on_peaks_that_cells_clip() -> None:
             assert ("on the cells" in found.level_words("hut")) == (sharper < on_cells)
             doubted.add(turns)
     assert doubted == {False, True}
+
+
+def test_no_cell_keeps_a_required_peak_by_clipping(found: Consequences) -> None:
+    """As with the limits of a report."""
+    (response,) = found.responses
+    clipped_pa = float(response.facade.pressure_pa.max())
+    assert response.counted_peak_pa > 1.2 * clipped_pa
+    limits_pa = (0.9 * clipped_pa, 1.1 * clipped_pa, 1.1 * response.counted_peak_pa)
+    required = [Requirement.parsed(f"peak {limit_pa / 1e3:.6f}") for limit_pa in limits_pa]
+    assert [response.keeps(own) for own in required] == [False, False, True]
+    assert response.keeps(Requirement.parsed("impulse 1e5"))
 
 
 def test_the_table_has_a_row_a_layout_charge_and_bay(found: Consequences) -> None:

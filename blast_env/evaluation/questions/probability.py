@@ -87,7 +87,8 @@ def _scaled(response: BuildingResponse, charge: Charge) -> BuildingResponse:
     other_m = bay_places(site, [bay.bay for bay in facade.bays]).distance_m
     factors = load_factors(old, response.places.distance_m, charge.tnt_kg, other_m)
     histories = rescaled(facade.time_s, facade.pressure_pa, *factors)
-    return replace(response, charge=charge, site=site, on_cells=respond(facade.bays, *histories))
+    on_cells = respond(facade.bays, *histories)
+    return replace(response, charge=charge, site=site, on_cells=on_cells, counted_peak_pa=nan)
 
 
 DRAWS: Final = 1000

@@ -22,6 +22,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
+from math import nan
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -51,6 +52,7 @@ from blast_env.response.facade import (
     respond,
 )
 from blast_env.response.levels import LevelOfProtection, worst
+from blast_env.response.requirements import Requirement
 from blast_env.response.sdof import impulses
 from blast_env.response.wall_sections import DamageLevel
 from blast_env.site import Scenario
@@ -105,6 +107,8 @@ class BuildingResponse:
         known: Whether the loads on its bays are known, by bay; empty if not recorded.
         stepped: Whether it has an oblique wall, modelled as a staircase of modules.
         site: The site with the charge and the barrier; `None` for loads without one.
+        counted_peak_pa: The peak on it to compare with limits, see
+            `blast_env.evaluation.engines.walls`; NaN if not recorded.
     """
 
     building: str
@@ -114,6 +118,11 @@ class BuildingResponse:
     known: Mapping[str, bool] = field(default_factory=dict)
     stepped: bool = False
     site: BlastSite | None = None
+    counted_peak_pa: float = nan
+
+    def keeps(self, requirement: Requirement) -> bool:
+        """Return whether it keeps a requirement; cells keep no limit of the peak by clipping."""
+        return requirement.kept_by(self.facade) and not self.counted_peak_pa > requirement.peak_pa
 
     @cached_property
     def places(self) -> BayPlaces:
@@ -558,6 +567,10 @@ def response_to(
         facade = respond([bays[bay] for bay in record.bays], record.time_s, record.pressure_pa)
         site = build_site(scenario, placed, 0, charge)
         responses = by_building(scenario, facade, site, details.peak_factor, details.known)
+        counted_pa = {name: load.counted_pa for name, load in details.buildings.items()}
+        responses = [
+            replace(own, counted_peak_pa=counted_pa.get(own.building, nan)) for own in responses
+        ]
     # 3. Neighbours without a facade by probits, the barrier by its own movements.
     assert record.pieces is not None
     return Consequences(
