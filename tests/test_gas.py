@@ -215,6 +215,14 @@ def test_files_have_the_tables(unprotected: GasResult, tmp_path: Path) -> None:
     assert workbook["Modules"].max_row == len(unprotected.modules) + 1
 
 
+def test_a_gauge_deep_in_a_wall_records_the_air_on_small_cells_too() -> None:
+    """It may be a module deep, which is more than one cell of 0.25 m."""
+    site = hut(gauges=[{"name": "deep", "position_m": [6.45, 4.1, 0.6]}])
+    result = blast_env.simulate(site, engine="gas", cell_m=0.25, until=1e-3)
+    assert result.gauges["x_m"].tolist() == [5.875]
+    assert any("inside a solid" in note for note in result.gauge_notes)
+
+
 def test_bad_input_is_named(unprotected: GasResult) -> None:
     with pytest.raises(UnknownNameError, match="'front'"):
         unprotected.history("frnt")

@@ -439,11 +439,14 @@ def _air_cell(
     cell = grid.cell_at(position_m)
     if not grid.solid[cell]:
         return cell
-    near = [slice(max(at - 1, 0), at + 2) for at in cell]
+    # A gauge may lie as deep in a structure as a module is wide.
+    around = ceil(MODULE_SIDE_M / grid.cell_m)
+    near = [slice(max(at - around, 0), at + around + 1) for at in cell]
     air = np.argwhere(~grid.solid[tuple(near)]) + [part.start for part in near]
     if len(air) == 0:
         raise BlastEnvError(
-            f"gauge {name!r} at {position_m} is inside a solid, more than a cell from the air"
+            f"gauge {name!r} at {position_m} is in a solid, more than {MODULE_SIDE_M:g} m from"
+            " the air"
         )
     centres = np.array(grid.origin_m) + grid.cell_m * (air + 0.5)
     nearest = air[np.argmin(((centres - position_m) ** 2).sum(axis=1))]
