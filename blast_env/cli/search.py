@@ -90,6 +90,10 @@ ThreatName = Literal["visible", "hidden"]
 
 PACKAGE: Final = PackageProposer().name
 _WITHOUT_BLASTS: Final = (PACKAGE, AGENT)
+_ROUGH_RESPONSE: Final = (
+    "the response of facades comes in steps, which guesses hardly tell apart, and a rule may be far"
+    " better: --verify the proposal"
+)
 _METHOD_HELP: Final = f"{', '.join((*proposers(), AGENT))}. package and agent run no blast."
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
@@ -408,6 +412,8 @@ def _proposal_without_blasts(
     word = word_on(problem, result.layout)
     if word:
         print_line(f"note: {word}")
+    if scenario.objective.is_response:
+        print_line(f"note: {_ROUGH_RESPONSE}")
     if out is not None:
         make_folder(out)
         provenance = {**digests, "command": command(), "versions": versions()}

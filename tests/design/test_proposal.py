@@ -105,6 +105,14 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     assert load_layout(tmp_path / "none" / "layout.json", wide_yard()) == ()
 
 
+def test_a_proposal_by_the_response_of_facades_is_said_to_be_rough() -> None:
+    for name, is_rough in (("guard_post", True), ("visitor_entrance", False)):
+        done = CliRunner().invoke(app, ["search", "--method", "package", "--scenario", name])
+        assert done.exit_code == 0, done.output
+        words = " ".join(done.output.split())
+        assert ("the response of facades comes in steps, which guesses" in words) == is_rough
+
+
 def test_single_modules_are_proposed_without_a_blast(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a site of 120 m the blasts of all rules took 3.3 hours."""
 
