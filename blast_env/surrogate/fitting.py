@@ -47,6 +47,8 @@ _AT_POINTS: Final = 1.0
 
 _RATE: Final = 1e-2
 _DECAY: Final = 2e-2
+"""Decay of weights: with a twentieth of it they grow, and networks say anything off their data."""
+
 _MOST_GRADIENT: Final = 1.0
 """Bound on the norm of a gradient, against outliers among the groups."""
 

@@ -51,8 +51,8 @@ LEAST_OVER: Final = -8.0
 MOST_OVER: Final = 1.4
 """Bounds on the logarithm of the load at a point over Kingery and Bulmash's.
 
-In the data no point has more than 3.8 times their load, between walls, or less than a thousandth,
-behind them. Far outside its fit a single network may say anything.
+Points between walls have up to four times their load, those behind walls down to a thousandth: the
+bounds leave room for both. Far outside its fit a single network may say anything.
 """
 
 _ASIDES: Final = len(ASIDE_M)

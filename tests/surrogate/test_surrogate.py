@@ -377,6 +377,15 @@ def test_a_network_gone_astray_stays_within_the_loads_that_points_can_have(
     assert np.isfinite(surrogate.guess(site, [()], [charge]).spread).all()
 
 
+def test_the_loads_at_points_of_published_blasts_are_within_what_a_network_may_say() -> None:
+    rows = studies.surrogate.named_rows([Path("docs/data/close_site_blasts.parquet")])
+    samples = studies.surrogate.samples_of(rows[rows["protected"]].iloc[:60])
+    for loads in (samples.impulse, samples.peak):
+        over = (loads.at_points - loads.known)[np.isfinite(loads.at_points)]
+        assert len(over) > 1000
+        assert -8.0 < over.min() < over.max() < 1.4
+
+
 def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     surrogate = by_hand()
     path = surrogate.save(tmp_path / "surrogate.json")
