@@ -47,7 +47,12 @@ def read_regular(path: str | Path, most_bytes: int) -> bytes:
         if status.st_size > most_bytes:
             raise BlastEnvError(f"has {status.st_size} bytes, must have at most {most_bytes}")
         with os.fdopen(descriptor, "rb", closefd=False) as file:
-            return file.read(most_bytes)
+            # Not `most_bytes` at once, which would be set aside for the smallest file, too. A file
+            # of the system may hold more than it says.
+            content = file.read(min(status.st_size + 1, most_bytes))
+            if len(content) > status.st_size:
+                content += file.read(most_bytes - len(content))
+            return content
     except OSError as error:
         raise BlastEnvError(f"cannot be read: {error.strerror or error}") from error
     finally:

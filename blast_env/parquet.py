@@ -96,9 +96,9 @@ def checked_table(path: Path, columns: Sequence[Column] = ()) -> pa.Table:
         raise BlastEnvError(f"{path}: {error}") from error
     try:
         # Not read_table: it reads a folder named "seed=3" as a partition, and adds a column.
-        with pq.ParquetFile(pa.BufferReader(content)) as file:
+        with pq.ParquetFile(pa.BufferReader(content), pre_buffer=False) as file:
             _check_schema(path, file, columns)
-            table = file.read()
+            table = file.read(use_threads=False)
         table.validate(full=True)
         _check_texts(path, table)
     except (BlastEnvError, MemoryError):

@@ -41,6 +41,9 @@ LIMITS: Final = ReadingLimits()
 _WITHIN: Final = "BLAST_ENV_READING"
 """Set in reading processes: a nested `read_apart` counts towards their limits."""
 
+_FRUGAL: Final = {"ARROW_DEFAULT_MEMORY_POOL": "system", "OMP_NUM_THREADS": "1"}
+"""Settings of libraries in reading processes: other pools, and threads, set memory aside unused."""
+
 
 class ReadingError(BlastEnvError):
     """Reading a file exceeded a limit, or ended its process."""
@@ -75,7 +78,7 @@ class Reading(Generic[Found]):
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, _WITHIN: "1"},
+            env={**os.environ, **_FRUGAL, _WITHIN: "1"},
         )
 
     def result(self) -> Found:
@@ -171,7 +174,8 @@ def serve() -> None:
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     """Call a function, and return its pickled result or error."""
     try:
-        return pickle.dumps((function(*arguments), None))
+        # In the newest protocol, arrays and tables are copied once: by default three times.
+        return pickle.dumps((function(*arguments), None), pickle.HIGHEST_PROTOCOL)
     except Exception as error:
         if isinstance(error, MemoryError) or "bad_alloc" in str(error):
             return pickle.dumps((None, MemoryError()))

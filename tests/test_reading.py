@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from blast_env.errors import BlastEnvError
+from blast_env.parquet import checked_table
 from blast_env.reading import Reading, ReadingError, ReadingLimits, read_apart
 from tests.pieces_of_reading import die, double, fault, fill, refuse, spin
+
+BLASTS = Path(__file__).parents[1] / "docs/data/later_site_blasts.parquet"
 
 pytestmark = pytest.mark.usefixtures("apart")
 
@@ -46,6 +49,18 @@ def test_memory_is_limited() -> None:
     with pytest.raises(ReadingError, match=r"a\.osm: takes more than 100 MB of memory"):
         read_apart("a.osm", fill, 20, limits=limits)
     assert read_apart("a.osm", fill, 8, limits=limits) == 8
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux limits memory")
+@pytest.mark.parametrize("threads", ["1", "4"])
+def test_a_table_takes_a_few_times_its_own_memory(
+    threads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # 30 MB of texts and numbers. Arrow's own pool and threads had set aside over ten times that.
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
+    path, limits = BLASTS, ReadingLimits(memory_bytes=150_000_000)
+    table = read_apart(str(path), checked_table, path, limits=limits)
+    assert table.nbytes > 25_000_000
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
