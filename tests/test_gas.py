@@ -15,7 +15,7 @@ from blast_env.evaluation.validation import NOT_KNOWN
 from blast_env.gas import GasRun
 from blast_env.results import EndReason
 from blast_env.site import Charge
-from tests.builders import block
+from tests.builders import block, zone
 from tests.gas_sites import WALL, hut
 
 HUT = hut()
@@ -221,6 +221,18 @@ def test_a_gauge_deep_in_a_wall_records_the_air_on_small_cells_too() -> None:
     result = blast_env.simulate(site, engine="gas", cell_m=0.25, until=1e-3)
     assert result.gauges["x_m"].tolist() == [5.875]
     assert any("inside a solid" in note for note in result.gauge_notes)
+
+
+def test_a_gauge_deep_under_pieces_records_the_nearest_air() -> None:
+    """A blast had ended by an error where a layout buries a gauge."""
+    site = hut(
+        build_zone=zone(3.0, 2.5, 6, 6, stock=36, height_m=1.5),
+        gauges=[{"name": "buried", "position_m": [4.6, 4.1, 0.25]}],
+    )
+    layout = [(row, column) for row in range(6) for column in range(6)]
+    result = blast_env.simulate(site, layout, engine="gas", until=1e-3)
+    assert result.gauges["z_m"].tolist() == [1.75]  # over the pieces
+    assert any("gauge buried: lies inside a solid" in note for note in result.gauge_notes)
 
 
 def test_bad_input_is_named(unprotected: GasResult) -> None:

@@ -439,15 +439,14 @@ def _air_cell(
     cell = grid.cell_at(position_m)
     if not grid.solid[cell]:
         return cell
-    # A gauge may lie as deep in a structure as a module is wide.
-    around = ceil(MODULE_SIDE_M / grid.cell_m)
-    near = [slice(max(at - around, 0), at + around + 1) for at in cell]
-    air = np.argwhere(~grid.solid[tuple(near)]) + [part.start for part in near]
+    # A gauge may lie as deep in a structure as a module is wide, and under pieces of any size.
+    around, air = ceil(MODULE_SIDE_M / grid.cell_m), np.empty((0, 3))
+    while len(air) == 0 and around < 2 * max(grid.shape):
+        near = [slice(max(at - around, 0), at + around + 1) for at in cell]
+        air = np.argwhere(~grid.solid[tuple(near)]) + [part.start for part in near]
+        around *= 2
     if len(air) == 0:
-        raise BlastEnvError(
-            f"gauge {name!r} at {position_m} is in a solid, more than {MODULE_SIDE_M:g} m from"
-            " the air"
-        )
+        raise BlastEnvError(f"gauge {name!r} at {position_m}: there is no air on the site")
     centres = np.array(grid.origin_m) + grid.cell_m * (air + 0.5)
     nearest = air[np.argmin(((centres - position_m) ** 2).sum(axis=1))]
     return int(nearest[0]), int(nearest[1]), int(nearest[2])

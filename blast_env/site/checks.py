@@ -21,6 +21,7 @@ from blast_env.site.structures import (
     AnyStructure,
     depth_inside_m,
     is_over_or_below,
+    solids_around,
     terrace_problems,
 )
 from blast_env.site.zone import BuildZone, EmptyZone, distance_m, empty_zone, source_bounds_m
@@ -423,18 +424,35 @@ def _gauge_problems(scenario: Content) -> Iterator[Problem]:
     yield from _repeated_names("gauges", scenario.gauges)
     for index, gauge in enumerate(scenario.gauges):
         key, (x_m, y_m, z_m) = f"gauges[{index}].position_m", gauge.position_m
-        place = f"({x_m:g}, {y_m:g})"
-        yield from outside_site(scenario, key, place, Rectangle(x_m, y_m, x_m, y_m))
+        yield from outside_site(scenario, key, f"({x_m:g}, {y_m:g})", Rectangle(x_m, y_m, x_m, y_m))
         yield from _above_the_air(scenario, f"{key}[2]", z_m)
-        for j, structure in enumerate(scenario.structures):
-            depth_m = depth_inside_m(gauge.position_m, structure)
-            if depth_m > MODULE_SIDE_M + TOLERANCE_M:
-                top = "" if structure.height_m is None else f", {structure.height_m:g} m high"
-                message = (
-                    f"{place}, {z_m:g} m high, is {depth_m:g} m deep inside structures[{j}],"
-                    f" {_described(structure)}{top}, must be at most {MODULE_SIDE_M:g} m deep"
-                )
-                yield Problem(key, message)
+        yield from _depth_problems(scenario, key, gauge)
+
+
+def _depth_problems(scenario: Content, key: str, gauge: GaugeSection) -> Iterator[Problem]:
+    """Check that a gauge lies in the air or at most a module inside structures."""
+    x_m, y_m, z_m = gauge.position_m
+    place, is_deep = f"({x_m:g}, {y_m:g}), {z_m:g} m high", False
+    for j, structure in enumerate(scenario.structures):
+        depth_m = depth_inside_m(gauge.position_m, structure)
+        if depth_m > MODULE_SIDE_M + TOLERANCE_M:
+            is_deep = True
+            top = "" if structure.height_m is None else f", {structure.height_m:g} m high"
+            message = (
+                f"{place}, is {depth_m:g} m deep inside structures[{j}],"
+                f" {_described(structure)}{top}, must be at most {MODULE_SIDE_M:g} m deep"
+            )
+            yield Problem(key, message)
+    # Structures that touch have less air around them than each by itself.
+    near, has_air = solids_around(gauge.position_m, MODULE_SIDE_M, scenario.structures)
+    if not (is_deep or has_air) and len(near) > 1:
+        together = " and ".join(
+            f"structures[{j}], {_described(scenario.structures[j])}" for j in near
+        )
+        message = (
+            f"{place}, is where {together} meet, must be at most {MODULE_SIDE_M:g} m from the air"
+        )
+        yield Problem(key, message)
 
 
 def _above_the_air(

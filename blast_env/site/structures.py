@@ -481,6 +481,54 @@ def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructu
     return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
 
 
+_SLIVER_M: Final = 1e-6
+"""Narrower gaps between structures are rounding."""
+
+
+def solids_around(
+    position_m: tuple[float, float, float], within_m: float, structures: Sequence[AnyStructure]
+) -> tuple[list[int], bool]:
+    """Return the structures near a point, and whether they leave air there.
+
+    Args:
+        position_m: The point.
+        within_m: Half the side of the cube around the point, whose part above the ground counts.
+        structures: The structures.
+
+    Returns:
+        Indices of the structures in the cube; whether there is air in it.
+    """
+    grown_m = within_m + 2.0 * _SLIVER_M
+    low_m, high_m = np.array(position_m) - grown_m, np.array(position_m) + grown_m
+    low_m[2] = max(low_m[2], 0.0)
+    owners, found = list[int](), [np.empty((0, 2, 3))]
+    for index, structure in enumerate(structures):
+        ends_m = structure.base_m, np.inf if structure.height_m is None else structure.height_m
+        plans_m = np.array(structure.boxes_m).reshape(-1, 2, 2)
+        heights_m = np.broadcast_to(np.array(ends_m)[:, np.newaxis], (len(plans_m), 2, 1))
+        boxes_m = np.clip(np.concatenate((plans_m, heights_m), axis=2), low_m, high_m)
+        is_near = (np.diff(boxes_m, axis=1) > _SLIVER_M).all(axis=(1, 2))
+        if is_near.any():
+            owners.append(index)
+            found.append(boxes_m[is_near])
+    return owners, not _fill(np.concatenate(found), low_m, high_m)
+
+
+def _fill(boxes_m: FloatArray, low_m: FloatArray, high_m: FloatArray) -> bool:
+    """Return whether boxes (n, 2, 3) fill a space between two corners (3,)."""
+    # The sides of the boxes divide the space into blocks, each in a box or in none.
+    middles_m = []
+    for axis in range(3):
+        cuts_m = np.unique([low_m[axis], *boxes_m[..., axis].flat, high_m[axis]])
+        widths_m = np.diff(cuts_m)
+        middles_m.append((cuts_m[:-1] + 0.5 * widths_m)[widths_m > _SLIVER_M])
+    blocks_m = np.stack(np.meshgrid(*middles_m, indexing="ij"), axis=-1)
+    is_solid = np.zeros(blocks_m.shape[:-1], dtype=bool)
+    for box_m in boxes_m:
+        is_solid |= ((box_m[0] < blocks_m) & (blocks_m < box_m[1])).all(axis=-1)
+    return bool(is_solid.all())
+
+
 # ---- Outlines, which engines take.
 
 BARRIER_NAME: Final = "barrier"

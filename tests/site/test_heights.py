@@ -172,6 +172,45 @@ def test_what_only_just_stands_is_allowed(path: KeyPath, value: object) -> None:
     assert lines_for(changed(tall_document(), path, value)) == []
 
 
+def row_of_houses(gauge_m: tuple[float, float, float], gap_m: float = 0.0) -> Document:
+    """Return a document with two houses of 4 x 3 m side by side, and a gauge."""
+    document = minimal_document()
+    sizes = {"kind": "ModularObstacle", "rows": 6, "columns": 8, "protected": True, "height_m": 4.0}
+    document["structures"] = [
+        sizes | {"name": "left", "corner_m": [10.0, 4.0]},
+        sizes | {"name": "right", "corner_m": [14.0 + gap_m, 4.0]},
+    ]
+    document["gauges"] = [{"name": "seam", "position_m": gauge_m}]
+    return document
+
+
+@pytest.mark.parametrize("x_m", [13.75, 14.0, 14.25])
+def test_a_gauge_on_the_seam_of_two_structures_is_refused(x_m: float) -> None:
+    """It is on the surface of each, or near it, and far from the air; the blast had refused it."""
+    line, *others = lines_for(row_of_houses((x_m, 5.5, 2.0)))
+    assert others == []
+    assert line == (
+        f"f.toml: gauges[0].position_m: ({x_m:g}, 5.5), 2 m high, is where structures[0], 'left'"
+        " (x 10 to 14 m, y 4 to 7 m) and structures[1], 'right' (x 14 to 18 m, y 4 to 7 m) meet,"
+        " must be at most 0.5 m from the air"
+    )
+
+
+@pytest.mark.parametrize(
+    ("gauge_m", "gap_m"),
+    [
+        ((14.0, 4.0, 2.0), 0.0),  # where the seam meets the air, at the front
+        ((14.0, 4.5, 2.0), 0.0),  # a module behind it
+        ((14.0, 5.5, 3.5), 0.0),  # a module below the roofs
+        ((14.0, 5.5, 2.0), 0.5),  # a gap between them
+    ],
+)
+def test_a_gauge_on_a_seam_near_the_air_is_allowed(
+    gauge_m: tuple[float, float, float], gap_m: float
+) -> None:
+    assert lines_for(row_of_houses(gauge_m, gap_m)) == []
+
+
 def test_unsound_structure_does_not_make_the_air_too_low() -> None:
     """It might be the highest, and then the air would be high enough."""
     document = without(tall_document(), ("site", "air_height_m"))
