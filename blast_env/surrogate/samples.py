@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
@@ -19,6 +20,8 @@ from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import site_of
+
+HalfArray = NDArray[np.float16]
 
 _BLOCK: Final = 2**20
 """Rows of relations that are copied at once."""
@@ -56,8 +59,8 @@ class Samples:
 
     Attributes:
         features: Features of all points (points, FEATURES).
-        relations: Relations of solids to points, ordered by sample, solid and point
-            (rows, RELATIONS).
+        relations: Relations of solids to points, ordered by sample, solid and point, in half
+            precision: there are gigabytes of them (rows, RELATIONS).
         traits: Traits of pieces, ordered by sample and piece (pieces, TRAITS).
         area_m2: Wall area represented by each point (points,).
         counts: Number of points of each sample (samples,).
@@ -72,7 +75,7 @@ class Samples:
     """
 
     features: FloatArray
-    relations: SingleArray
+    relations: HalfArray
     traits: FloatArray
     area_m2: FloatArray
     counts: np.ndarray
@@ -176,22 +179,22 @@ class _Rows:
     """
 
     def __init__(self) -> None:
-        self._blocks: list[SingleArray] = []
-        self._parts: list[SingleArray] = []
+        self._blocks: list[HalfArray] = []
+        self._parts: list[HalfArray] = []
         self._count = 0
 
     def add(self, relations: FloatArray) -> None:
         """Add the relations of solids to the points of a sample (solids, points, RELATIONS)."""
-        self._parts.append(relations.astype(np.float32).reshape(-1, RELATIONS))
+        self._parts.append(relations.astype(np.float16).reshape(-1, RELATIONS))
         self._count += len(self._parts[-1])
         if self._count >= _BLOCK:
             self._end_block()
 
-    def joined(self) -> SingleArray:
+    def joined(self) -> HalfArray:
         """Return all of them (rows, RELATIONS), and forget them."""
         self._end_block()
         rows = sum(map(len, self._blocks))
-        found, first = np.empty((rows, RELATIONS), dtype=np.float32), 0
+        found, first = np.empty((rows, RELATIONS), dtype=np.float16), 0
         self._blocks.reverse()
         while self._blocks:
             block = self._blocks.pop()
