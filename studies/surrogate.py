@@ -91,6 +91,12 @@ def blasts(
     favourites: Annotated[int, typer.Option(min=1, help="How many of those.")] = 3,
     changes: Annotated[int, typer.Option(min=1, help="Layouts that it looks at for them.")] = 300,
     draws: Annotated[int, typer.Option(min=0, help="Draws of the packaged agent.")] = 0,
+    least: Annotated[
+        float,
+        typer.Option(
+            min=0.0, max=1.0, help="Share that the first favourite takes off, else no blasts."
+        ),
+    ] = 0.0,
     threats: Annotated[int, typer.Option(min=1, help="Charges on each.")] = 1,
     cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
     cache: Annotated[Path, typer.Option(help="Folder in which they are kept.")] = Path(
@@ -107,7 +113,7 @@ def blasts(
     with user_errors(), running_on(cluster):
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
-        recipe = Recipe(layouts, rules, liked, favourites, changes, draws)
+        recipe = Recipe(layouts, rules, liked, favourites, changes, draws, least)
         names = site_names([kind], first, sites)
         engine = GasEngine() if cells is None else GasEngine(cells=cells)
         run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, folder=cache)
@@ -127,6 +133,9 @@ class Recipe:
             from the best on, because neighbours in that ranking are much alike.
         changes: Layouts that this search evaluates, besides those of the rules.
         draws: Number of draws of the packaged agent.
+        least: Least share of the load that the first of the surrogate's favourites takes off, by
+            its prediction: a charge with a smaller one has no layouts. Most layouts of most sites
+            take off little, and a fit learns little of those that take off much.
     """
 
     layouts: int = 12
@@ -135,9 +144,13 @@ class Recipe:
     favourites: int = 3
     changes: int = 300
     draws: int = 0
+    least: float = 0.0
 
     def of(self, site: Scenario, threat: LoadCase, seed: int) -> list[Layout]:
-        """Return the layouts for a threat, sorted and distinct, the empty one first."""
+        """Return the layouts for a threat, sorted and distinct, the empty one first.
+
+        There are none if its favourites take off less than `least`.
+        """
         rng, moves = np.random.default_rng(seed), Moves(site)
         ruled = list(dict.fromkeys(layouts_by_rule(site).values()))
         found: list[Layout] = [(), *ruled]
@@ -156,6 +169,9 @@ class Recipe:
         if self.surrogate is not None:
             guesses = Guesses.of(self.surrogate, LoadCaseSet(site, (threat,), charge=threat.charge))
             liked = improved(guesses, [(), *ruled], self.changes, rng)
+            unprotected, first = guesses.loads([(), liked[0]])
+            if first > (1.0 - self.least) * unprotected:
+                return []
             found += liked[: _APART * self.favourites : _APART]
         if self.draws:
             found += packaged_agent().sample(site, threat.charge, self.draws, seed)
@@ -170,7 +186,8 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: GasEngine, fold
         for threat in draw_threats(site, range(threats))
         for layout in recipe.of(site, threat, seed)
     )
-    kept_rows(SiteBlasts(name, blasts), engine, folder)
+    if blasts:
+        kept_rows(SiteBlasts(name, blasts), engine, folder)
     return len(blasts)
 
 

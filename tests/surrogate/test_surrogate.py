@@ -771,6 +771,10 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     liked = Recipe(0, 0, by_hand(), 2).of(YARD, threat, 1)[1:]
     best, tenth = Guesses.of(by_hand(), case()).loads(liked)
     assert best < tenth < Guesses.of(by_hand(), case()).loads([*ruled]).min()
+    unprotected, best = Guesses.of(by_hand(), case()).loads([(), liked[0]])
+    takes_off = 1.0 - best / unprotected
+    assert Recipe(0, 0, by_hand(), 2, least=0.9 * takes_off).of(YARD, threat, 1)[1:] == liked
+    assert Recipe(0, 0, by_hand(), 2, least=1.1 * takes_off).of(YARD, threat, 1) == []
     drawn = Recipe(0, 0, draws=3).of(YARD, threat, 1)[1:]
     assert 0 < len(drawn) <= 3
     assert all(LayoutState.of(YARD, layout).layout == layout for layout in drawn)
