@@ -34,6 +34,7 @@ _ORIGINS: Final = {
     "liked_site_blasts": "further sites, and layouts that a surrogate and an agent like",
     "further_site_blasts": "further kerbs, streets, courts and short fronts, and such layouts",
     "later_site_blasts": "further ones of these kinds, two thirds with loads at points of walls",
+    "strong_site_blasts": "close, front, square, street and kerb sites; layouts that take off much",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)

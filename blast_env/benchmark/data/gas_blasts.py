@@ -23,6 +23,7 @@ TABLES: Final = (
     "liked_site_blasts",
     "further_site_blasts",
     "later_site_blasts",
+    "strong_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
