@@ -151,11 +151,13 @@ class PieceKnowledge:
         """
         # 1. The pieces that are not kept are computed: numbers of these are below 0.
         numbers, site = self._numbers, self._site
-        new = list(dict.fromkeys([b for boxes in layouts for b in boxes if b not in numbers]))
-        of_new = {box: -number for number, box in enumerate(new, start=1)}
+        of_new: dict[Box, int] = {}
         found: Numbers = np.zeros((len(layouts), max(map(len, layouts)) + 1), dtype=np.int32)
         for own, boxes in zip(found, layouts, strict=True):
-            own[: len(boxes)] = [numbers.get(box) or of_new[box] for box in boxes]
+            own[: len(boxes)] = [
+                numbers.get(box) or of_new.setdefault(box, -1 - len(of_new)) for box in boxes
+            ]
+        new = list(of_new)
         sizes = (self._points, len(site.solids), len(self._base), len(new), found.shape[1])
 
         def make(room: Room) -> tuple[Bench, Pieces]:
@@ -181,10 +183,11 @@ class PieceKnowledge:
 
     def _keep(self, boxes: Sequence[Box], fresh: Pieces) -> None:
         """Keep those of the new pieces that have often been met."""
-        met = self._met
-        for box in boxes:
-            met[box] = met.get(box, 0) + 1
-        again = [number for number, box in enumerate(boxes) if met[box] > _OFTEN]
+        met, again = self._met, list[int]()
+        for number, box in enumerate(boxes):
+            times = met[box] = met.get(box, 0) + 1
+            if times > _OFTEN:
+                again.append(number)
         if not again:
             return
         first, kept = len(self._numbers), self._pieces

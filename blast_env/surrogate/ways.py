@@ -489,7 +489,7 @@ def _stop(
         first = last
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _first_clear(
     above: int,
     low_m: float,
@@ -520,7 +520,7 @@ def _first_clear(
     return above
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _span(
     start_x_m: float,
     start_y_m: float,
@@ -555,7 +555,7 @@ def _span(
     return near_m, far_m, low, high, low_back, high_back
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def cut(
     start_x_m: float,
     start_y_m: float,
@@ -589,7 +589,7 @@ def cut(
     return enter, leave
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _lowest_m(start_m: float, rise_m: float, enter: float, leave: float) -> float:
     """Return the least height of a line between two shares of it."""
     return min(start_m + enter * rise_m, start_m + leave * rise_m)
