@@ -754,9 +754,10 @@ class Episodes:
 
     def _recall_bare(self, episode: Episode) -> None:
         """Take the loads without a barrier from an earlier episode of the same threats."""
-        if () in episode.loads or episode.loads_key not in episode.site.bare:
+        known = None if () in episode.loads else episode.site.bare.get(episode.loads_key)
+        if known is None:
             return
-        episode.loads[()] = episode.site.bare[episode.loads_key]
+        episode.loads[()] = known
         episode.site.evaluator.counts.cache_hits += episode.seeds.size
 
     def site_of(self, scenario: Scenario) -> _Site:

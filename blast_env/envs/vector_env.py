@@ -158,7 +158,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         played, begun = _indices(~self._over), _indices(self._over)
         if not self._running or (len(begun) and self.autoreset_mode == AutoresetMode.DISABLED):
             raise gym.error.ResetNeeded(f"call reset: no episode in environments {begun}")
-        wanted = self.episodes.code.numbers(self._checked(actions, played))
+        wanted = self.episodes.code.numbers(self._checked(actions))
         rewards = np.zeros(self.num_envs)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         # 1. All place, then all blasts run in one batch.
@@ -210,15 +210,16 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     def _all(self) -> range:
         return range(self.num_envs)
 
-    def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> IntArray:
+    def _checked(self, actions: IntArray | Sequence[int]) -> IntArray:
         given = np.asarray(actions)
         shape = self.num_envs, *self._limits.shape
         if given.shape != shape or not np.issubdtype(given.dtype, np.integer):
             raise gym.error.InvalidAction(
                 f"actions have shape {given.shape} and type {given.dtype}, must be {shape} integers"
             )
-        are_wrong = (given < 0) | (given >= self._limits)
-        wrong = [index for index in played if are_wrong[index].any()]
+        beyond = (given < 0) | (given >= self._limits)
+        are_wrong: BoolArray = beyond.reshape(self.num_envs, -1).any(axis=1)
+        wrong = [index for index in _indices(are_wrong) if not self._over[index]]
         if wrong:
             raise gym.error.InvalidAction(
                 f"actions[{wrong[0]}] is {given[wrong[0]]}, must be in {self.one.action_space}"

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +162,10 @@ class SeedRange(Enum):
         return [self.value.start + int(number) for number in drawn]
 
 
+_PLAIN: Final = (MeanRisk, WorstRisk)
+"""Risk measures of which a single load is its own."""
+
+
 @dataclass(frozen=True, eq=False)
 class LoadCaseSet:
     """A scenario and its threats, for comparing layouts.
@@ -233,6 +237,12 @@ class LoadCaseSet:
         """Whether the risk measure is the mean over the charges."""
         return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
 
+    @property
+    def takes_one_as_it_is(self) -> bool:
+        """Whether a single load is the combined one and, without a target, the objective value."""
+        objective = self.scenario.objective
+        return objective.target is None and isinstance(self.risk or objective.risk, _PLAIN)
+
     def combined(self, loads: Sequence[float] | FloatArray) -> float:
         """Combine loads into one: the mean per charge, then the risk measure over the charges.
 
@@ -242,7 +252,7 @@ class LoadCaseSet:
         # 1. A single load is its own mean and its own worst; 2. the mean over the realisations of
         # each charge; 3. the risk measure over the charges.
         risk = self.risk or self.scenario.objective.risk
-        if len(loads) == 1 and isinstance(risk, MeanRisk | WorstRisk):
+        if len(loads) == 1 and isinstance(risk, _PLAIN):
             return float(loads[0])
         values = np.asarray(loads, dtype=np.float64)
         count = len(self.threats) // self.realisations

@@ -27,6 +27,7 @@ from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
 from blast_env.site import AnyScenario, find_scenario
 from blast_env.site.blast_site import Charge
+from blast_env.site.objective import ObjectiveSection
 from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:
@@ -535,6 +536,8 @@ class Assessment:
         """Return the assessment of a layout from its loads, one per threat of the case."""
         # Impulse, peak and objective, each combined over the threats by itself.
         combined, counts = case.combined, case.scenario.objective
+        if len(loads) == 1 and case.takes_one_as_it_is:  # the usual case of an episode
+            return cls._of_one(loads[0], counts)
         sums = [s for load in loads if (s := load.protected_impulse_sim) is not None]
         return cls(
             combined([load.protected_impulse_pa_s for load in loads]),
@@ -543,6 +546,19 @@ class Assessment:
             case.objective_value([load.load(counts) for load in loads], layout),
             all(map(attrgetter("in_range"), loads)),
             min([load.level for load in loads]) if counts.kind == "response" else None,
+        )
+
+    @classmethod
+    def _of_one(cls, loads: BlastLoads, counts: ObjectiveSection) -> Self:
+        """Return the same of the only threat, whose loads are the combined ones."""
+        sim = loads.protected_impulse_sim
+        return cls(
+            float(loads.protected_impulse_pa_s),
+            None if sim is None else float(sim),
+            float(loads.protected_peak_pa),
+            float(loads.load(counts)),
+            loads.in_range,
+            loads.level if counts.kind == "response" else None,
         )
 
     @property

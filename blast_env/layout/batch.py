@@ -146,7 +146,7 @@ class LayoutBatch:
         if more > 0:
             self._numbers = np.pad(self._numbers, ((0, 0), (0, more)))
         # 3. The rows of the layouts that begin anew.
-        rows = slice(None) if len(indices) == len(self.rules) else indices
+        rows = slice(None) if len(indices) == len(self.rules) else np.array(indices)
         self.legal[rows], self.occupancy[rows] = start.legal, start.occupancy
         self.table[rows], self.left[rows] = table, left
         self.stock[rows] = rules.zone.stock, *catalogue.stocks
