@@ -218,7 +218,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
                 f"actions have shape {given.shape} and type {given.dtype}, must be {shape} integers"
             )
         beyond = (given < 0) | (given >= self._limits)
-        are_wrong: BoolArray = beyond.reshape(self.num_envs, -1).any(axis=1)
+        are_wrong = np.any(beyond.reshape(self.num_envs, -1), axis=1)
         wrong = [index for index in _indices(are_wrong) if not self._over[index]]
         if wrong:
             raise gym.error.InvalidAction(
