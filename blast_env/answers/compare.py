@@ -178,6 +178,7 @@ def building_verdicts(found: Consequences) -> tuple[BuildingVerdict, ...]:
         words, *panes = response_cells(alone, name)
         flags = [why for building, why in found.unchecked if building == name]
         flags += [walls.words for walls in found.unjudged if walls.building == name]
+        flags += [words for building, words in found.unloaded if building == name]
         clipped = alone.level_on_cells(name) > alone.level(name)
         cells = (words, likely, *panes, alone.validation(name).words)
         verdicts.append(BuildingVerdict(name, response.severity, clipped, cells, tuple(flags)))

@@ -130,6 +130,9 @@ def _gas_answer(result: "GasResult") -> Iterator[AnyPart]:
     ]
     texts += result.moved_gauges
     texts += (f"{wall.building}: {wall.words}" for wall in result.unjudged)
+    texts += (
+        f"{load.name}: {words}" for load in result.structure_loads if (words := load.unloaded_words)
+    )
     cells = " x ".join(str(count) for count in result.run.grid.shape)
     yield from _end(result, f"{cells} cells", "steps", texts)
 

@@ -57,6 +57,8 @@ class StructureLoad:
         worst_damage: The largest damage of its bays, for the same objective.
         validation: Validation status of the load, with its reason.
         impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
+        unloaded_m2: Area of its counted walls without a load, since pieces fill the gap before
+            them; `area_m2` and the means leave it out.
     """
 
     name: str
@@ -73,6 +75,18 @@ class StructureLoad:
     worst_damage: float | None = None
     validation: Validation = UNSTATED
     impulse_sim: float | None = None
+    unloaded_m2: float = 0.0
+
+    @property
+    def unloaded_words(self) -> str:
+        """A sentence on walls without a load behind pieces; empty without any."""
+        if not self.unloaded_m2:
+            return ""
+        of_m2 = self.unloaded_m2 + (self.area_m2 or 0.0)
+        return (
+            f"{self.unloaded_m2:.1f} of {of_m2:.1f} m2 of its assessed walls have no load, since"
+            " pieces fill the gap before them"
+        )
 
     @classmethod
     def on(
@@ -101,7 +115,7 @@ class StructureLoad:
         return type(self)(  # `dataclasses.replace` takes four times as long
             *(self.name, self.protected, self.weight, impulse_pa_s, peak_pa, self.peak_weight),
             *(self.in_range, self.notes, self.building, self.area_m2, self.response),
-            *(self.worst_damage, self.validation, self.impulse_sim),
+            *(self.worst_damage, self.validation, self.impulse_sim, self.unloaded_m2),
         )
 
 
@@ -147,6 +161,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
         area_m2=sum(areas_m2) if is_known else None,
         validation=worst_validation(part.validation for part in counted),
         impulse_sim=sum(hit) if hit else None,
+        unloaded_m2=sum(part.unloaded_m2 for part in parts),
     )
 
 

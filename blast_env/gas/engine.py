@@ -330,10 +330,29 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
     """
     # 1. Faces that touch air, and those of walls behind pieces.
     exposed = exposed_faces(grid, grid.solid)
-    leaning, walls = leaning_faces(grid, _barrier_cells(grid, site))
-    faces = exposed.followed_by(leaning)
-    cells = np.concatenate((exposed.solid, walls))
-    # 2. Their structures and modules.
+    leaning = leaning_faces(grid, _barrier_cells(grid, site))
+    faces = exposed.followed_by(leaning.outer)
+    # 2. Their structures, modules and walls.
+    return _table_of(grid, site, faces, np.concatenate((exposed.solid, leaning.cells)))
+
+
+def unloaded_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
+    """Return the cell faces of walls without a load, since pieces fill the gap before them."""
+    faces = leaning_faces(grid, _barrier_cells(grid, site)).unloaded
+    return _table_of(grid, site, faces, faces.solid)
+
+
+def _table_of(grid: GasGrid, site: BlastSite, faces: Faces, cells: NDArray[np.int64]) -> FaceTable:
+    """Return the table of faces.
+
+    Args:
+        grid: The grid.
+        site: The site.
+        faces: The faces (n,).
+        cells: The solid cell that takes the load of each face (n, 3): the one behind it, or that of
+            the wall on which its piece leans.
+    """
+    # 1. Structures and modules.
     behind = tuple(cells.T)
     z_m = grid.centres_m(2)[behind[2]]
     structure, row, column = np.full((3, len(faces)), -1)
@@ -348,7 +367,7 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
         own = here[inside]
         structure[own] = index
         row[own], column[own] = of_row[inside], of_column[inside]
-    # 3. West, east, south, north by axis and side; upward faces are roofs, downward ones
+    # 2. West, east, south, north by axis and side; upward faces are roofs, downward ones
     # undersides.
     upright = 2 * faces.axis + (faces.side > 0)
     face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
@@ -363,7 +382,7 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
         share=np.ones(len(faces)),
         outward=np.array([*OUTWARDS.values(), (0.0, 0.0), (0.0, 0.0)])[face],
     )
-    # 4. The walls of polygons, from the places on them.
+    # 3. The walls of polygons, from the places on them.
     places_m = faces.of_cells(cells).centres_m(grid)[:, :2]
     for index, outline in enumerate(site.structures):
         if outline.footprint is not None:

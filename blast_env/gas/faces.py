@@ -1,7 +1,7 @@
 """Faces between air and solid, on which loads are recorded."""
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,10 @@ class Faces:
         )
         air, axis, side = (np.concatenate(pair) for pair in pairs)
         return Faces(air, axis, side)
+
+    def chosen(self, chosen: NDArray[np.bool_]) -> "Faces":
+        """Return those of a mask (n,)."""
+        return Faces(self.air[chosen], self.axis[chosen], self.side[chosen])
 
     def of_cells(self, cells: NDArray[np.int64]) -> "Faces":
         """Return faces of other cells (n, 3), turned as these."""
@@ -116,21 +120,30 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
     return Faces(np.concatenate(air), np.concatenate(axes), np.concatenate(sides))
 
 
-def leaning_faces(grid: GasGrid, pieces: NDArray[np.bool_]) -> tuple[Faces, NDArray[np.int64]]:
-    """Return the outer faces of pieces that lean on upright walls, and the cells of these walls.
+class LeaningFaces(NamedTuple):
+    """The faces of upright walls that pieces lean on.
 
-    A cell of a wall without air before all pieces, as between two buildings, has no face.
+    Attributes:
+        outer: The outer faces of the pieces before them.
+        cells: The cell of the wall behind each of these (n, 3).
+        unloaded: The faces of walls without air before all pieces, as between two buildings.
+    """
+
+    outer: Faces
+    cells: NDArray[np.int64]
+    unloaded: Faces
+
+
+def leaning_faces(grid: GasGrid, pieces: NDArray[np.bool_]) -> LeaningFaces:
+    """Return the faces of upright walls that pieces lean on.
 
     Args:
         grid: The grid.
         pieces: Mask of the cells of pieces (nx, ny, nz); other solid cells are walls.
-
-    Returns:
-        The faces; the cell of the wall behind each of them (n, 3).
     """
     # Nothing stands outside the grid, and no load is known there.
     piece, wall, air = (np.pad(mask, 1) for mask in (pieces, grid.solid & ~pieces, ~grid.solid))
-    faces, cells = NO_FACES, NO_FACES.air
+    outer, cells, unloaded = NO_FACES, NO_FACES.air, NO_FACES
     for axis in range(2):
         for side in (-1, 1):
             # 1. Cells of walls before which a piece stands.
@@ -143,10 +156,13 @@ def leaning_faces(grid: GasGrid, pieces: NDArray[np.bool_]) -> tuple[Faces, NDAr
                 is_before &= piece[tuple(beyond.T)]
             # 3. If that is air, the piece before it hands its load on.
             is_loaded = air[tuple(beyond.T)]
-            count = int(is_loaded.sum())
-            loaded = Faces(beyond[is_loaded] - 1, np.full(count, axis), np.full(count, side))
-            faces, cells = faces.followed_by(loaded), np.vstack((cells, behind[is_loaded] - 1))
-    return faces, cells
+            axes, sides = np.full(len(behind), axis), np.full(len(behind), side)
+            faces = Faces(beyond - 1, axes, sides)
+            outer = outer.followed_by(faces.chosen(is_loaded))
+            cells = np.vstack((cells, behind[is_loaded] - 1))
+            # 4. Else it has none.
+            unloaded = unloaded.followed_by(faces.of_cells(behind - 1).chosen(~is_loaded))
+    return LeaningFaces(outer, cells, unloaded)
 
 
 def ground_faces(grid: GasGrid) -> Faces:

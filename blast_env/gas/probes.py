@@ -207,7 +207,9 @@ class PatchHistories:
     @property
     def history_pa(self) -> NDArray[np.float32]:
         """Mean overpressures of the steps, Pa (patches, steps)."""
-        return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
+        # Without a patch, the number of steps cannot be inferred from the size.
+        shape = len(self._history), len(self.faces)
+        return np.array(self._history, dtype=np.float32).reshape(shape).T
 
 
 class Gauges(LoadTable):

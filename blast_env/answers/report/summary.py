@@ -63,6 +63,8 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
     for walls in study.protected.unjudged:
         title = study.scenario.title_of(walls.building)
         yield Line.of(f"{title}: {walls.words}.", kind="flag")
+    for building, words in study.protected.unloaded:
+        yield Line.of(f"{study.scenario.title_of(building)}: {words}.", kind="flag")
     if behind.is_asked:
         limited = [own.limit.building for own in behind.limited]
         yield from lines(without_facade_words(study.scenario, limited), "flag")

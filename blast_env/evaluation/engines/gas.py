@@ -67,7 +67,7 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
     from blast_env.evaluation.engines.walls import WallHistories
-    from blast_env.gas.engine import GasRun, Recorders
+    from blast_env.gas.engine import FaceTable, GasRun, Recorders
     from blast_env.gas.grid import GasGrid
     from blast_env.gas.solver import Recorder
     from blast_env.tables import RunRecord
@@ -452,6 +452,7 @@ class GasResult:
                 scaled.in_range,
                 notes=scaled.notes,
                 area_m2=self._area_m2(index),
+                unloaded_m2=self._unloaded_m2(index),
                 validation=self._validations[outline.name],
             )
             for index, outline in enumerate(self.run.site.structures)
@@ -530,6 +531,24 @@ class GasResult:
     def _area_m2(self, index: int) -> float:
         """Return the area of the counted walls of a structure, m2."""
         return float(self._share[self._walls(index)].sum()) * self.run.grid.cell_m**2
+
+    def _unloaded_m2(self, index: int) -> float:
+        """Return the area of its counted walls without a load, behind pieces that fill a gap."""
+        if self._unloaded is None:
+            return 0.0
+        from blast_env.gas.engine import counted_faces
+
+        own = counted_faces(self._unloaded, self.run.site, index)
+        return float(self._unloaded.share[own].sum()) * self.run.grid.cell_m**2
+
+    @cached_property
+    def _unloaded(self) -> "FaceTable | None":
+        """The faces of walls without a load; `None` without a barrier."""
+        from blast_env.gas.engine import unloaded_table_of  # Numba takes half a second to import
+
+        site = self.run.site
+        has_barrier = any(structure.is_barrier for structure in site.structures)
+        return unloaded_table_of(self.run.grid, site) if has_barrier else None
 
     @cached_property
     def _share(self) -> FloatArray:

@@ -26,6 +26,7 @@ from blast_env.evaluation.record import (
     BlastLoads,
     BlastRecord,
     BuildingLoad,
+    StructureLoad,
     WallLoad,
     WallsWithoutVerdict,
 )
@@ -183,6 +184,10 @@ class GasOutcome(Protocol):
         """Counted walls in no bay."""
 
     @property
+    def structure_loads(self) -> tuple[StructureLoad, ...]:
+        """The loads on all structures."""
+
+    @property
     def stepped_notes(self) -> tuple[str, ...]:
         """Notes on peaks on oblique walls."""
 
@@ -297,6 +302,9 @@ def _notes(result: GasOutcome, loads: Mapping[str, BuildingLoad]) -> Iterator[st
             for part in parts:
                 yield from result.impulse(part.name).notes
     yield from (f"{name}: {NOT_KNOWN}" for name, load in loads.items() if not load.known)
+    yield from (
+        f"{load.name}: {words}" for load in result.structure_loads if (words := load.unloaded_words)
+    )
     yield from result.stepped_notes
     yield from result.gauge_notes
 

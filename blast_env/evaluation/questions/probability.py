@@ -75,6 +75,7 @@ def scaled_to(judged: Consequences, charge: Charge) -> Consequences:
         tuple(_scaled(response, charge) for response in judged.responses),
         unchecked=judged.unchecked,
         unjudged=judged.unjudged,
+        unloaded=judged.unloaded,
     )
 
 

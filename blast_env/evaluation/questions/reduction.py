@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -539,6 +540,9 @@ class Evaluation:
                     f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
                     f"{checked}, e.g. {'; '.join(outside[0].notes)}"
                 )
+            worst = max(of_structure, key=attrgetter("unloaded_m2"))
+            if words := worst.unloaded_words:
+                notes.append(f"{worst.name}: {words}")
         return tuple(notes)
 
     def to_dict(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, bay_rows
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.engines.gas_validation import BayPlaces, bay_places, bay_validations
 from blast_env.evaluation.questions.reduction import CHARGE_COLUMNS, charge_values
-from blast_env.evaluation.record import BlastRecord, WallLoad, WallsWithoutVerdict
+from blast_env.evaluation.record import BlastRecord, WallLoad, WallsWithoutVerdict, on_buildings
 from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.geometry import Layout
@@ -259,6 +259,7 @@ class Consequences:
         unchecked: A building and the reason to distrust its loads, one per charge and building
             with such a reason.
         unjudged: Walls of buildings with a facade that no verdict covers.
+        unloaded: A building and the words on walls without a load behind pieces that fill a gap.
     """
 
     responses: tuple[BuildingResponse, ...]
@@ -266,6 +267,7 @@ class Consequences:
     barriers: tuple[BarrierResponse, ...] = ()
     unchecked: tuple[tuple[str, str], ...] = ()
     unjudged: tuple[WallsWithoutVerdict, ...] = ()
+    unloaded: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
@@ -277,6 +279,7 @@ class Consequences:
             tuple(barrier for part in every for barrier in part.barriers),
             tuple(own for part in every for own in part.unchecked),
             tuple(dict.fromkeys(walls for part in every for walls in part.unjudged)),
+            tuple(dict.fromkeys(walls for part in every for walls in part.unloaded)),
         )
 
     @property
@@ -297,6 +300,7 @@ class Consequences:
             response.building for response in self.responses if response.stepped
         )
         notes = [f"{walls.building}: {walls.words}" for walls in self.unjudged]
+        notes += [f"{building}: {words}" for building, words in self.unloaded]
         notes += self._thin
         notes += [f"{name}: {STEPPED}" for name in stepped]
         reasons: dict[str, list[str]] = {}
@@ -358,6 +362,7 @@ class Consequences:
         """Whether a building with a facade has a note on its loads or its walls."""
         return (
             any(building in self.buildings for building, _ in self.unchecked)
+            or any(building in self.buildings for building, _ in self.unloaded)
             or bool(self.unjudged or self._thin)
             or any(response.stepped for response in self.responses)
             or not all(self._known)
@@ -579,6 +584,11 @@ def response_to(
         (BarrierResponse(charge, record.pieces, record.taken_away),),
         details.unchecked,
         details.unjudged,
+        tuple(
+            (load.name, words)
+            for load in on_buildings(record.loads.structures)
+            if (words := load.unloaded_words)
+        ),
     )
 
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 import blast_env
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
-from blast_env.evaluation import StructureLoad
+from blast_env.evaluation import LoadCase, StructureLoad, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
+from blast_env.evaluation.record import BlastRecord
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.site import Charge, Scenario
@@ -177,11 +178,33 @@ def test_pieces_hand_on_what_pieces_before_them_take() -> None:
     assert hidden["impulse_pa_s"].mean() == pytest.approx(pieces["impulse_pa_s"].mean(), rel=1e-6)
 
 
+OTHER = block("other", 4.5, 2.0, 4, 2, height_m=3.0)
+"""A building that leaves a gap of the width of a wall before a half of the front."""
+WORDS = "6.0 of 12.0 m2 of its assessed walls have no load, since pieces fill the gap before them"
+
+
 def test_what_stands_between_two_buildings_hands_on_nothing() -> None:
-    """There is no air before the wall: as if the two buildings touched."""
-    other = block("other", 4.5, 2.0, 4, 2, height_m=3.0)
-    load = on_front(blasted(lane(other), upright(0, 1)))
-    assert load.area_m2 == 6.0
+    """There is no air before the wall: as if the two buildings touched. It is named."""
+    blast = GasEngine().blast(lane(OTHER), (upright(0, 1),), 0, Charge((1.0, 4.0), 60.0))
+    found = blast.recorded()
+    load = on_front(found.result)
+    assert (load.area_m2, load.unloaded_m2) == (6.0, 6.0)
+    assert load.unloaded_words == WORDS
+    record = found.record
+    assert f"front: {WORDS}" in record.complete.notes
+    assert BlastRecord.decoded(record.encoded()).loads.structures == record.loads.structures
+
+
+def test_walls_that_take_their_load_from_pieces_are_not_named() -> None:
+    for layout in ((), (upright(0, 1),), (upright(0, 0), upright(0, 1))):
+        begun = GasEngine(until=1e-4).blast(lane(), layout, 0).run()
+        assert [load.unloaded_words for load in begun.structure_loads if load.unloaded_m2] == []
+
+
+def test_an_evaluation_names_walls_without_a_load() -> None:
+    threats = [LoadCase(Charge((1.0, 4.0), 60.0), 0)]
+    found = evaluate_layout(lane(OTHER), (upright(0, 1),), threats=threats, engine="gas")
+    assert f"front: {WORDS}" in found.to_dict()["notes"]
 
 
 @given(st.lists(st.sampled_from([upright(row, column) for row in (0, 2, 4) for column in (0, 1)])))
