@@ -111,6 +111,8 @@ def blasts(
     joins the tables.
     """
     with user_errors(), running_on(cluster):
+        if least and surrogate is None:
+            raise BlastEnvError(f"--least {least:g}: needs --surrogate, whose favourites it is of")
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
         recipe = Recipe(layouts, rules, liked, favourites, changes, draws, least)

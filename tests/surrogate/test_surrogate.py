@@ -780,6 +780,14 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     assert all(LayoutState.of(YARD, layout).layout == layout for layout in drawn)
 
 
+def test_blasts_with_a_least_share_need_a_surrogate(tmp_path: Path) -> None:
+    folder = tmp_path / "blasts"
+    options = ["blasts", "--least", "0.3", "--cache", str(folder)]
+    done = CliRunner().invoke(studies.surrogate.app, options)
+    assert done.exit_code != 0
+    assert not folder.exists()
+
+
 def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     table = pq.read_table("docs/data/close_site_blasts.parquet")
     names = table["scenario"].unique()[:40]
