@@ -79,11 +79,15 @@ def assessment(
         target: Required level of protection.
         mass_error: Uncertainty of the masses; see `Uncertainty`.
         required: Further requirements.
+
+    Raises:
+        BlastEnvError: If no building can be judged with the layout in question.
     """
     scenario, judged = blasts.scenario, found[blasts.judged]
+    judged.check_judged()
     yield from _verdict(blasts, judged, target)
-    # The layout in question before the site without it.
-    judged_first = [*found.items()][::-1]
+    # The layout in question before the site without it, where nothing may be there to judge.
+    judged_first = [(name, own) for name, own in found.items() if own.responses][::-1]
     for requirement in required:
         for name, own in judged_first:
             kept = all(response.keeps(requirement) for response in own.responses)
@@ -159,7 +163,9 @@ def _levels_changed(blasts: Blasts, judged: Consequences) -> Iterator[str]:
     if coarse is None or blasts.coarse is None:
         return
     for building in judged.buildings:
-        fine = judged.of(building)[judged.worst_number].facade.level_of_protection
+        if building not in coarse.buildings:
+            continue  # larger cells close a gap
+        fine = judged.under(judged.worst_number).level(building)
         other = coarse.level(building)
         if other != fine:
             words = blasts.coarse.engine.words
@@ -186,8 +192,8 @@ def response_cells(
     """
     whole = found.summary(building)
     error = nan
-    if coarse is not None:
-        fine = found.of(building)[number].facade.broken_panes
+    if coarse is not None and building in coarse.buildings:
+        fine = found.under(number).of(building)[0].facade.broken_panes
         error = convergence_index(fine, coarse.of(building)[0].facade.broken_panes)
     panes = Number(whole.broken, error=error, digits=1, flag=f" of {whole.panes}")
     return whole.level, panes, whole.condition, whole.damage
@@ -310,6 +316,10 @@ def _deciding_facade(
     """Return the response of the building that decides, by layout, and its title."""
     *_, judged = found.values()
     worst = max(judged.responses, key=lambda response: response.severity)
-    number = judged.responses.index(worst)
     title = f"{scenario.title_of(worst.building)}: {charge_text(worst.charge)}, the worst"
-    return [(name, own.responses[number]) for name, own in found.items()], title
+    rows = [
+        (name, response)
+        for name, own in found.items()
+        for response in own.under(judged.worst_number).of(worst.building)
+    ]
+    return rows, title

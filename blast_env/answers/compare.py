@@ -154,6 +154,8 @@ def _loads(
 class BuildingVerdict(NamedTuple):
     """The response of a building to one blast, without the histories on its bays.
 
+    A building of which no air touches a wall has empty cells, and the reason among its flags.
+
     Attributes:
         is_clipped: Whether its level on the cells, which clip peaks, is higher.
         cells: Its cells in the table of buildings.
@@ -176,13 +178,23 @@ def building_verdicts(found: Consequences) -> tuple[BuildingVerdict, ...]:
         draws = level_probability(alone, Uncertainty(), _DRAWS)
         likely = probability_text(draws.of(level), _DRAWS) if level else _NONE
         words, *panes = response_cells(alone, name)
-        flags = [why for building, why in found.unchecked if building == name]
-        flags += [walls.words for walls in found.unjudged if walls.building == name]
-        flags += [words for building, words in found.unloaded if building == name]
         clipped = alone.level_on_cells(name) > alone.level(name)
         cells = (words, likely, *panes, alone.validation(name).words)
-        verdicts.append(BuildingVerdict(name, response.severity, clipped, cells, tuple(flags)))
+        flags = _flags(found, name)
+        verdicts.append(BuildingVerdict(name, response.severity, clipped, cells, flags))
+    for name in dict.fromkeys(walls.building for walls in found.unjudged):
+        if name not in found.buildings:
+            cells = ("no verdict", *(_NONE,) * 5)
+            verdicts.append(BuildingVerdict(name, Severity(), False, cells, _flags(found, name)))
     return tuple(verdicts)
+
+
+def _flags(found: Consequences, name: str) -> tuple[str, ...]:
+    """Return the reasons to distrust the verdict on a building."""
+    flags = [why for building, why in found.unchecked if building == name]
+    flags += [walls.words for walls in found.unjudged if walls.building == name]
+    flags += [words for building, words in found.unloaded if building == name]
+    return tuple(flags)
 
 
 def verdict_table(

@@ -323,17 +323,27 @@ def check_distinct(threats: Sequence[LoadCase]) -> None:
             raise BlastEnvError(f"threats[{index}] is {threat}, appears twice, must be unique")
 
 
-def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
-    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats).
+def check_something_arrives(
+    cases: Sequence[LoadCaseSet], unprotected: FloatArray, without_load: Sequence[Sequence[str]]
+) -> None:
+    """Refuse a case whose load without a barrier is 0 under every threat, or is no number.
 
-    A load that is not a number is refused, too: no air touches the walls that it is the mean of.
+    Args:
+        cases: The cases.
+        unprotected: Load without a barrier (cases, threats).
+        without_load: The protected buildings of each case without a load: no air touches the walls
+            that it would be the mean of.
+
+    Raises:
+        BlastEnvError: If there is such a case.
     """
-    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
+    means = np.atleast_2d(unprotected).mean(axis=1)
+    for case, mean, names in zip(cases, means, without_load, strict=True):
         name = case.name or case.scenario.name
-        if np.isnan(mean):
+        if np.isnan(mean) or (names and not mean > 0.0):
             raise BlastEnvError(
-                f"{name}: a protected building has no load without a barrier: no air touches its "
-                "assessed walls (`blast-env simulate` names it)"
+                f"{name}: no load without a barrier on {', '.join(names)}: no air touches the "
+                "assessed walls"
             )
         if not mean > 0.0:
             raise BlastEnvError(

@@ -118,7 +118,9 @@ class DesignProblem:
         return self._free(pairs)
 
     def _free(self, pairs: Sequence[tuple[Layout, LoadCase]]) -> list[float]:
-        loads = self.evaluator.loads_of_many(pairs, self.processes)
+        return self._objectives(self.evaluator.loads_of_many(pairs, self.processes))
+
+    def _objectives(self, loads: Iterable[BlastLoads]) -> list[float]:
         return [load.load(self.scenario.objective) for load in loads]
 
     def loads_with(self, layout: Sequence[Element]) -> list[BlastLoads]:
@@ -149,6 +151,8 @@ class DesignProblem:
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
         """
-        unprotected = self._free([((), threat) for threat in self.threats])
-        check_something_arrives([self.case], np.array(unprotected))
+        pairs = [((), threat) for threat in self.threats]
+        loads = self.evaluator.loads_of_many(pairs, self.processes)
+        unprotected = self._objectives(loads)
+        check_something_arrives([self.case], np.array(unprotected), [loads[0].without_load])
         return tuple(unprotected)

@@ -197,10 +197,12 @@ class BlastLoads:
     ) -> "BlastLoads":
         """Return the loads with the response of given facades, without another blast.
 
+        That of a structure of which no air touches a bay is 0.
+
         Raises:
             BlastEnvError: If the bays were not recorded.
         """
-        if not self.bays:
+        if not self.bays and not self._hides({own.bay.structure for own in named}):
             raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
         responded = []
         for load in self.structures:
@@ -208,6 +210,11 @@ class BlastLoads:
             response, most = structure_response(own, named, objective)
             responded.append(replace(load, response=response, worst_damage=most))
         return replace(self, structures=tuple(responded))
+
+    def _hides(self, names: Collection[str]) -> bool:
+        """Return whether no air touches the assessed walls of some structures."""
+        own = [load for load in self.structures if load.name in names]
+        return bool(own) and all(load.area_m2 == 0.0 for load in own)
 
     @property
     def has_particles(self) -> bool:
@@ -247,7 +254,9 @@ class BlastLoads:
             alternative.name: {*alternative.glazing, *alternative.wall}
             for alternative in scenario.alternatives
         }
-        return bool(self.bays) and all(
+        if not self.bays:
+            return self._hides({own.bay.structure for own in scenario.named_bays()})
+        return all(
             known.get(bay.name) == set(bay.damage)
             and np.isfinite([*bay.damage.values(), bay.area_m2, bay.glazed_m2]).all()
             for bay in self.bays
@@ -262,6 +271,11 @@ class BlastLoads:
     def _buildings(self) -> tuple[StructureLoad, ...]:
         """The loads on the protected buildings."""
         return on_buildings(self.protected)
+
+    @property
+    def without_load(self) -> tuple[str, ...]:
+        """The protected buildings without a load: no air touches their assessed walls."""
+        return tuple(load.name for load in self._buildings if load.area_m2 == 0.0)
 
     @property
     def protected_impulse_pa_s(self) -> float:
@@ -401,7 +415,8 @@ class WallsWithoutVerdict(NamedTuple):
 
     Attributes:
         area_m2: Area of these walls that touches air or pieces, m2.
-        of_m2: Area of all counted walls of the building that touches air or pieces, m2.
+        of_m2: Area of all counted walls of the building that touches air or pieces, m2; 0 if none
+            does, so that the building has no verdict at all.
         structures: The parts of the building with such walls.
     """
 
@@ -414,6 +429,8 @@ class WallsWithoutVerdict(NamedTuple):
     def words(self) -> str:
         """A sentence that states the area and the parts."""
         parts = ", ".join(self.structures)
+        if not self.of_m2:
+            return f"no air touches its assessed walls ({parts}): no verdict covers it"
         return (
             f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
             "no verdict covers them"

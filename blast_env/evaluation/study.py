@@ -406,6 +406,12 @@ class Study:
         )
         return without, behind
 
+    @property
+    def unloaded_limits(self) -> tuple[Limit, ...]:
+        """The limits of buildings without a load behind the layout: no verdict checks them."""
+        checked = {own.limit for own in self.verdicts[1].limited}
+        return tuple(limit for limit in self.options.limits if limit not in checked)
+
     def _limited(self, records: Sequence[BlastRecord]) -> Iterator[LoadLimit]:
         for limit in self.options.limits:
             for threat, record in zip(self.threats, records, strict=True):

@@ -121,7 +121,8 @@ def blast_pictures(unprotected: BlastMeasurement, protected: BlastMeasurement) -
     """Yield the unfolded facades of the protected buildings, and the histories on them."""
     structures = protected.result.blast.scenario.structures
     for name, parts in buildings_of(structures).items():
-        known = name in protected.record.complete.buildings
+        sides = (unprotected, protected)
+        known = all(name in side.record.complete.buildings for side in sides)
         if not (known and any(part.protected for part in parts)):
             continue
         yield _history(unprotected, protected, name)
@@ -164,9 +165,10 @@ def damage_pictures(
 
     They are the unfolded facades and the pressure-impulse diagram of each building.
     """
-    words = "no barrier", "layout"
-    for own in zip(_responses(unprotected), _responses(protected), strict=True):
-        name, rows = own[0].building, list(zip(words, own, strict=True))
+    sides = {"no barrier": _responses(unprotected), "layout": _responses(protected)}
+    names = dict.fromkeys(response.building for own in sides.values() for response in own)
+    for name in names:
+        rows = [(side, x) for side, own in sides.items() for x in own if x.building == name]
         yield Drawing(f"{name}: facades unfolded", png(facade_picture(rows, name)), is_facade=True)
         points = [(side, response.facade) for side, response in rows]
         diagram = pressure_impulse_diagram(points, name)

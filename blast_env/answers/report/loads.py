@@ -1,7 +1,7 @@
 """The loads of a report: by threat and size of cells, bay by bay, by item, and at other places."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from math import isnan
+from math import isnan, nan
 from typing import Any, Final
 
 from blast_env.answers.document import (
@@ -16,12 +16,14 @@ from blast_env.answers.document import (
 )
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.places import place_text
+from blast_env.evaluation.questions.verdict import BuildingResponse
 from blast_env.evaluation.study import Study, gas_of
 from blast_env.geometry import layout_text
 from blast_env.plots.report_figures import Drawing, worth_map
 
 _NONE: Final = "\N{EN DASH}"
 _MOST_BAYS: Final = 40
+_NO_AIR: Final = {"break_probability": nan, "condition": "", "damage": "", "validation": _NONE}
 _LOADS: Final = (
     *("building", "cells", "", "most loaded wall", "impulse (Pa s)", "peak (kPa)", "arrival (ms)"),
     *("impulse on that wall (Pa s)", "duration (ms)", "reduction", "validation status"),
@@ -134,27 +136,40 @@ def _bays(study: Study) -> Iterator[AnyPart]:
         *("structure/wall/storey/number", "panes break, without", "GSA", "wall panel"),
         *("with the layout", "GSA", "wall panel", "validation status of the load"),
     )
-    sides = zip(study.unprotected.responses, study.protected.responses, strict=True)
-    for unprotected, protected in sides:
-        both = list(zip(unprotected.rows, protected.rows, strict=True))
-        # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
-        both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
-        rows = [
-            (
-                str(bare["bay"]),
-                *(cell for row in (bare, behind) for cell in _bay_cells(row)),
-                str(behind["validation"]),
-            )
-            for bare, behind in both[:_MOST_BAYS]
-        ]
-        x_m, y_m = protected.charge.position_m
-        place = f"{protected.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
-        title = f"{study.scenario.title_of(protected.building)}, {place}"
-        fine = gas_of(study.blasts).cell_words
-        yield Table.of(f"Bay by bay: {title}, {fine}", headers, rows, len(headers))
-        if left_out := len(both) - len(rows):
-            words = f"And {left_out} more bays with less damage; blast-env assess --table has all."
-            yield Line.of(words, kind="quiet")
+    for number in range(len(study.threats)):
+        sides = study.unprotected.under(number), study.protected.under(number)
+        for name in dict.fromkeys(name for side in sides for name in side.buildings):
+            own = [response for side in sides for response in side.of(name)]
+            x_m, y_m = own[-1].charge.position_m
+            place = f"{own[-1].charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
+            title = f"Bay by bay: {study.scenario.title_of(name)}, {place}"
+            rows = _bay_rows(*(side.of(name) for side in sides))
+            fine = gas_of(study.blasts).cell_words
+            yield Table.of(f"{title}, {fine}", headers, rows[:_MOST_BAYS], len(headers))
+            if len(rows) > _MOST_BAYS:
+                left_out = len(rows) - _MOST_BAYS
+                words = f"And {left_out} more bays with less damage"
+                yield Line.of(f"{words}; blast-env assess --table has all.", kind="quiet")
+
+
+def _bay_rows(
+    unprotected: Sequence[BuildingResponse], protected: Sequence[BuildingResponse]
+) -> list[tuple[AnyCell, ...]]:
+    """Return a row for each bay of a building, those with the worst panes with the layout first.
+
+    A bay that no air touches on one side has no numbers there.
+    """
+    bare, behind = (
+        {str(row["bay"]): row for response in side for row in response.rows}
+        for side in (unprotected, protected)
+    )
+    both = [(name, bare.get(name, _NO_AIR), behind.get(name, _NO_AIR)) for name in (behind | bare)]
+    # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
+    both.sort(key=lambda rows: (str(rows[2]["condition"]), _share(rows[2])), reverse=True)
+    return [
+        (name, *_bay_cells(without), *_bay_cells(own), str(own["validation"]))
+        for name, without, own in both
+    ]
 
 
 def _share(row: Mapping[str, Any]) -> float:

@@ -49,8 +49,9 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
     bare, behind = study.verdicts
     if not behind.is_asked:
         yield Line.of(behind.word, kind="answer")
+        found = "can be judged" if study.protected.unjudged else "has a facade"
         yield Line.of(
-            "No load limit was given, and no building has a facade: a specialist has to interpret "
+            f"No load limit was given, and no building {found}: a specialist has to interpret "
             "the loads."
         )
     else:
@@ -65,6 +66,9 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
         yield Line.of(f"{title}: {walls.words}.", kind="flag")
     for building, words in study.protected.unloaded:
         yield Line.of(f"{study.scenario.title_of(building)}: {words}.", kind="flag")
+    for limit in study.unloaded_limits:
+        title = study.scenario.title_of(limit.building)
+        yield Line.of(f"{title}: it has no load, and its limit is not checked.", kind="flag")
     if behind.is_asked:
         limited = [own.limit.building for own in behind.limited]
         yield from lines(without_facade_words(study.scenario, limited), "flag")
@@ -98,11 +102,11 @@ def _facts(study: Study) -> Iterator[tuple[str, str]]:
 
 
 def _probability(study: Study) -> str:
-    behind, bare = (
-        level_probability(found, study.uncertainty)
-        for found in (study.protected, study.unprotected)
-    )
-    without = probability_text(bare.of(study.target), len(bare.levels))
+    behind = level_probability(study.protected, study.uncertainty)
+    without = "no verdict"
+    if study.unprotected.responses:
+        bare = level_probability(study.unprotected, study.uncertainty)
+        without = probability_text(bare.of(study.target), len(bare.levels))
     return f"level {behind.words(study.target)}; without the layout {without}"
 
 
@@ -123,9 +127,11 @@ def _masses(study: Study) -> str:
 def _reasons(study: Study) -> Iterator[str]:
     title_of, behind = study.scenario.title_of, study.protected
     for name in behind.buildings:
-        bare, own = study.unprotected.summary(name), behind.summary(name)
+        is_known = name in study.unprotected.buildings
+        bare = study.unprotected.summary(name).level if is_known else "no verdict"
+        own = behind.summary(name)
         yield (
-            f"{title_of(name)} has the level {own.level}; without the layout: {bare.level}. With it"
+            f"{title_of(name)} has the level {own.level}; without the layout: {bare}. With it"
             f" {own.broken:.1f} of {own.panes} panes break and {own.failed} of {own.panels} panels"
             f" fail; worst pane {own.condition}, worst panel {own.damage}."
         )

@@ -4,7 +4,7 @@ The history of a bay is the mean overpressure on its cell faces at each step. Ba
 touches, as in a wall between two parts of a building, have none and are left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import cbrt
@@ -162,13 +162,20 @@ class BayLoads:
 def unjudged_walls(
     table: "FaceTable",
     outlines: Sequence[StructureOutline],
-    buildings: Mapping[str, str],
+    buildings: Mapping[str, Collection[str]],
     bays: Sequence[FacadeBay],
     area_m2: FloatArray,
 ) -> tuple[WallsWithoutVerdict, ...]:
-    """Return the walls that no verdict covers, one item per building with a facade and any.
+    """Return the walls that no verdict covers, one item per building with any.
 
-    `area_m2` is the area of each face along the normal of its wall (faces,).
+    A building whose walls no air touches has no verdict at all, and an item with all of its parts.
+
+    Args:
+        table: The faces of the run.
+        outlines: The structures of the run.
+        buildings: The parts of each building with a facade, by its name.
+        bays: The bays of all facades.
+        area_m2: Area of each face along the normal of its wall (faces,).
     """
     structures = [outline.name for outline in outlines]
     left_out, counts = bay_patches(table, structures, bays) < 0, np.zeros(len(table.face), bool)
@@ -176,14 +183,15 @@ def unjudged_walls(
         walls = [FACE_NAMES.index(name) for name in outline.faces]
         counts |= (table.structure == index) & np.isin(table.face, walls)
     found = []
-    for building in dict.fromkeys(buildings[bay.bay.structure] for bay in bays):
-        parts = [i for i, name in enumerate(structures) if buildings.get(name) == building]
-        own = counts & np.isin(table.structure, parts)
+    for building, names in buildings.items():
+        own = counts & np.isin(table.structure, [structures.index(name) for name in names])
         without = own & left_out
-        if without.any():
-            names = tuple(structures[i] for i in np.unique(table.structure[without]).tolist())
+        if not own.any():
+            found.append(WallsWithoutVerdict(building, 0.0, 0.0, tuple(names)))
+        elif without.any():
+            parts = tuple(structures[i] for i in np.unique(table.structure[without]).tolist())
             left_m2, of_m2 = float(area_m2[without].sum()), float(area_m2[own].sum())
-            found.append(WallsWithoutVerdict(building, left_m2, of_m2, names))
+            found.append(WallsWithoutVerdict(building, left_m2, of_m2, parts))
     return tuple(found)
 
 

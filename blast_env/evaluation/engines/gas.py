@@ -397,13 +397,14 @@ class GasResult:
 
     @cached_property
     def unjudged(self) -> tuple[WallsWithoutVerdict, ...]:
-        """Counted walls in no bay, one item per building with a facade and such walls."""
-        scenario, table = self.blast.scenario, self.run.table
+        """Walls of buildings with a facade that no verdict covers, one item per building."""
+        scenario, layout = self.blast.scenario, self.blast.layout
+        parts = buildings_of(scenario.structures_with(layout)).items()
         return unjudged_walls(
-            table,
+            self.run.table,
             self.run.site.structures,
-            scenario.building_names,
-            scenario.bays_with(self.blast.layout),
+            {name: [x.name for x in own] for name, own in parts if any(x.facade for x in own)},
+            scenario.bays_with(layout),
             self._share * self.run.grid.cell_m**2,
         )
 

@@ -86,6 +86,9 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> PeakWei
     return PeakWeight(float(counted_pa[which]), source)
 
 
+NO_AIR: Final = "no air touches its assessed walls: it has no load"
+"""Note on a building that other structures or pieces hide."""
+
 _BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
 
@@ -302,6 +305,7 @@ def _notes(result: GasOutcome, loads: Mapping[str, BuildingLoad]) -> Iterator[st
             for part in parts:
                 yield from result.impulse(part.name).notes
     yield from (f"{name}: {NOT_KNOWN}" for name, load in loads.items() if not load.known)
+    yield from (f"{name}: {NO_AIR}" for name in _remaining(result) if name not in loads)
     yield from (
         f"{load.name}: {words}" for load in result.structure_loads if (words := load.unloaded_words)
     )

@@ -173,7 +173,9 @@ class Ladder:
     def _blast(self, charge: Charge, number: int) -> Consequences | None:
         try:
             case = LoadCaseSet(self.scenario, (LoadCase(charge),))
-            return consequences_of(Campaign(case, {"": self.layout}, self.evaluator).run())
+            found = consequences_of(Campaign(case, {"": self.layout}, self.evaluator).run())
+            found.check_judged()
+            return found
         except BlastEnvError:
             if number == 0:
                 raise
@@ -229,6 +231,9 @@ def capacity(
         evaluator: Its scenario, its engine, and its store of blasts.
         charges: The charges; their places count.
         progress: Called with the finished share of the places.
+
+    Raises:
+        BlastEnvError: If no building can be judged.
     """
     check_facades(evaluator.scenario, evaluator.engine)
     found = []

@@ -219,8 +219,7 @@ def level_probability(
     """
     draws = whole_number("draws", draws, 1, _MOST_DRAWS)
     deciding = whole_number("deciding", deciding, 1, _MOST_DRAWS)
-    if not judged.responses:
-        raise BlastEnvError("no building has a facade: there is no level of protection")
+    judged.check_judged()
     # 1. Quantiles of all uncertain quantities; 2. in each draw the lowest level of any deciding
     # bay: the level of a building is that of its worst bay.
     quantiles = _latin(draws, seed)

@@ -229,7 +229,10 @@ class Evaluation:
 
     def __post_init__(self) -> None:
         check_cvar_level(self.cvar_level)
-        check_something_arrives(self.cases, self.unprotected)
+        # Whether air touches a wall is the same under all threats.
+        first = (part.records[part.unprotected][0].loads for part in self.every)
+        without_load = [loads.without_load for loads in first]
+        check_something_arrives(self.cases, self.unprotected, without_load)
 
     @property
     def cases(self) -> tuple[LoadCaseSet, ...]:
@@ -529,6 +532,10 @@ class Evaluation:
                 f"{name}: protected, but without a facade: its response counts as 0"
                 for name in without_facade(self.scenario.structures)
             )
+            notes += (
+                f"{name}: no bay of its facade has a load: its response counts as 0"
+                for name in self._without_bays
+            )
         checked = self.engine.validated_range
         own = (record.loads.structures for record in self.blasts.records[self.blasts.judged])
         if self.engine.needs_calibration:
@@ -544,6 +551,14 @@ class Evaluation:
             if words := worst.unloaded_words:
                 notes.append(f"{worst.name}: {words}")
         return tuple(notes)
+
+    @property
+    def _without_bays(self) -> tuple[str, ...]:
+        """The protected structures with a facade of which no bay has a load behind the layout."""
+        bays = self.blasts.records[self.blasts.judged][0].loads.bays
+        loaded = {bay.structure for bay in bays}
+        own = (part for part in self.scenario.structures if part.protected and part.facade)
+        return tuple(part.name for part in own if part.name not in loaded)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the inputs, the versions, the results and the tables as plain data.

@@ -258,7 +258,8 @@ class Consequences:
         barriers: One per charge.
         unchecked: A building and the reason to distrust its loads, one per charge and building
             with such a reason.
-        unjudged: Walls of buildings with a facade that no verdict covers.
+        unjudged: Walls of buildings with a facade that no verdict covers. A building of which none
+            touches air has no response.
         unloaded: A building and the words on walls without a load behind pieces that fill a gap.
     """
 
@@ -282,11 +283,33 @@ class Consequences:
             tuple(dict.fromkeys(walls for part in every for walls in part.unloaded)),
         )
 
+    def check_judged(self) -> None:
+        """Refuse consequences without any building that can be judged.
+
+        Raises:
+            BlastEnvError: If there is none: it names those with a facade, and the reasons.
+        """
+        if not self.responses:
+            reasons = "; ".join(self._wall_notes) or "no building has a facade"
+            raise BlastEnvError(f"there is no level of protection: {reasons}")
+
     @property
     def worst_number(self) -> int:
-        """The number of the charge with the governing response."""
+        """The number of the charge with the governing response.
+
+        Raises:
+            BlastEnvError: If no building can be judged.
+        """
+        self.check_judged()
         worst = max(self.responses, key=lambda own: own.severity)
-        return self.responses.index(worst) // len(self.buildings)
+        return self._charges.index(worst.charge)
+
+    @property
+    def _charges(self) -> list[Charge]:
+        """The charges by their numbers."""
+        # A building that pieces hide under one charge, before they fall, has no response to it.
+        charges = [barrier.charge for barrier in self.barriers]
+        return charges or list(dict.fromkeys(response.charge for response in self.responses))
 
     @property
     def buildings(self) -> tuple[str, ...]:
@@ -299,9 +322,7 @@ class Consequences:
         stepped = dict.fromkeys(
             response.building for response in self.responses if response.stepped
         )
-        notes = [f"{walls.building}: {walls.words}" for walls in self.unjudged]
-        notes += [f"{building}: {words}" for building, words in self.unloaded]
-        notes += self._thin
+        notes = [*self._wall_notes, *self._thin]
         notes += [f"{name}: {STEPPED}" for name in stepped]
         reasons: dict[str, list[str]] = {}
         for building, reason in self.unchecked:
@@ -333,6 +354,12 @@ class Consequences:
                     f" approximate or outside, e.g. {own[0].words}"
                 )
         return notes
+
+    @property
+    def _wall_notes(self) -> list[str]:
+        """Notes on walls without a verdict or without a load."""
+        notes = [f"{walls.building}: {walls.words}" for walls in self.unjudged]
+        return notes + [f"{building}: {words}" for building, words in self.unloaded]
 
     @property
     def _known(self) -> list[bool]:
@@ -371,8 +398,8 @@ class Consequences:
 
     def under(self, number: int) -> "Consequences":
         """Return the responses of the buildings to one charge, by its number."""
-        count = len(self.buildings)
-        return Consequences(self.responses[number * count : (number + 1) * count])
+        charge = self._charges[number]
+        return Consequences(tuple(own for own in self.responses if own.charge == charge))
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return the responses of one building."""

@@ -1,0 +1,154 @@
+"""Buildings with a facade that other structures or pieces hide: no door drops them in silence.
+
+A front looks west at a charge. A porch touches all of it, or another building leaves a gap before
+it, which two walls fill. On some sites a house beside it can be judged.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from typer.testing import CliRunner
+
+from blast_env.answers import Document, Line, Table, assess, compare
+from blast_env.answers.report import Limit, Report, StudyOptions, report_document, run_report
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
+from blast_env.evaluation.blasts import Blasts
+from blast_env.evaluation.campaign import Campaign
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.questions.capacity import capacity
+from blast_env.evaluation.questions.verdict import consequences_by_layout, consequences_of
+from blast_env.geometry import Layout, Piece
+from blast_env.layout import write_layout
+from blast_env.response import LevelOfProtection
+from blast_env.site import Charge, Scenario, save_scenario
+from tests import builders
+from tests.builders import block, point
+from tests.figures import undrawn_figures
+
+CHARGE: Final = Charge((1.0, 4.0), 20.0)
+ENGINE: Final = GasEngine.with_cells("coarse")
+FACADE: Final = {"bay_m": 2.0, "glazing": "window_laminated_6", "wall": "concrete_200"}
+GLAZED: Final = {"height_m": 3.0, "protected": True, "faces": ["west"], "facade": FACADE}
+OTHERS: Final = {
+    "porch": block("porch", 5.5, 2.0, 8, 1, height_m=3.0),
+    "other": block("other", 4.5, 2.0, 8, 2, height_m=3.0),
+    "house": block("house", 8.0, 2.0, 8, 2, **GLAZED),
+}
+WALLS: Final[Layout] = tuple(Piece(row, 1, "wall", True) for row in (0, 4))
+HIDDEN: Final = "front: no air touches its assessed walls (front): no verdict covers it"
+FILLED: Final = (
+    "front: 12.0 of 12.0 m2 of its assessed walls have no load, since pieces fill the gap before"
+)
+
+
+def site(*others: str, **sections: Any) -> Scenario:
+    """Return the front, other structures, and a zone of 1 m before it for walls of 2 m."""
+    items = [{"name": "wall", "length_modules": 4, "height_m": 3.0, "cost": 1.0, "stock": 2}]
+    zone = builders.zone(5.0, 2.0, 8, 2, items=items)
+    charge = point(*CHARGE.position_m, CHARGE.tnt_kg)
+    own = block("front", 6.0, 2.0, 8, 2, **GLAZED), *(OTHERS[name] for name in others)
+    return builders.site("lane", (10.0, 8.0, 5.0), charge, *own, build_zone=zone, **sections)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of all blasts: most tests ask for the same ones."""
+    return tmp_path_factory.mktemp("blasts")
+
+
+def blasts_of(scenario: Scenario, layout: Layout, cache: Path) -> Blasts:
+    layouts: dict[str, Layout] = {"no barrier": ()} | ({"layout": layout} if layout else {})
+    return Campaign.on(scenario, layouts, [LoadCase(CHARGE)], ENGINE, None, cache).run()
+
+
+@pytest.mark.parametrize(("other", "layout"), [("porch", ()), ("other", WALLS)])
+def test_where_nothing_can_be_judged_the_error_names_buildings_and_reasons(
+    other: str, layout: Layout, tmp_path: Path, cache: Path
+) -> None:
+    scenario, options = site(other), ["--cells", "coarse", "--cache", str(cache)]
+    save_scenario(scenario, tmp_path / "site.toml")
+    if layout:
+        write_layout(tmp_path / "layout.json", scenario, layout, {})
+        options += ["--layout", str(tmp_path / "layout.json")]
+    done = CliRunner().invoke(app, ["assess", str(tmp_path / "site.toml"), *options])
+    said = " ".join(done.output.split())
+    assert done.exit_code == 2
+    assert f"error: there is no level of protection: {HIDDEN}" in said
+    assert "COMPLIES" not in said
+    assert (FILLED in said) == bool(layout)
+    evaluator = BlastEvaluator(scenario, ENGINE, cache=cache)
+    with pytest.raises(BlastEnvError, match="there is no level of protection: front: no air"):
+        capacity(evaluator, {"": layout}, [CHARGE])
+
+
+def test_a_verdict_on_the_others_is_flagged_with_the_building(cache: Path) -> None:
+    blasts = blasts_of(site("porch", "house"), (), cache)
+    found = consequences_by_layout(blasts)
+    judged = found["no barrier"]
+    assert judged.buildings == ("house",)
+    assert replace(judged, responses=(), unchecked=()).is_flagged
+    parts = Document.of(assess.assessment(blasts, found, LevelOfProtection.LOW, 0.1)).parts
+    assert f"flag: {HIDDEN}" in [part.text() for part in parts if isinstance(part, Line)]
+
+
+def test_the_table_of_buildings_has_a_row_without_a_verdict(cache: Path) -> None:
+    """As the page shows it."""
+    scenario = site("porch", "house")
+    verdicts = compare.building_verdicts(consequences_of(blasts_of(scenario, (), cache)))
+    table = compare.verdict_table(scenario, [("A", "T1", verdicts), ("A", "T2", verdicts)])
+    rows = [row for row in table.cells() if row[2] == "front"]
+    assert [row[1] for row in rows] == ["worst of 2", "T1", "T2"]
+    assert all(row[3] == "no verdict" for row in rows)
+    assert all(HIDDEN.removeprefix("front: ") in row[-1] for row in rows)
+
+
+def test_a_report_names_it_and_shows_its_bays_without_the_layout(cache: Path) -> None:
+    scenario = site("other", "house")
+    options = StudyOptions(
+        charges=(CHARGE,),
+        cells=("coarse", "coarse"),
+        items=False,
+        places=1,
+        limits=(Limit("front", peak_pa=1e9), Limit("house", peak_pa=1e9)),
+        cache=cache,
+    )
+    with undrawn_figures():
+        document = report_document(Report(run_report(scenario, WALLS, options).study))
+    said = [part for part in document.parts if isinstance(part, Line)]
+    flags = [line.text() for line in said if line.kind == "flag"]
+    assert f"{HIDDEN}." in flags
+    assert any(flag.startswith(FILLED) for flag in flags)
+    assert "front: it has no load, and its limit is not checked." in flags
+    tables = [part for part in document.parts if isinstance(part, Table)]
+    (bays,) = (table for table in tables if table.title.startswith("Bay by bay: front"))
+    for _, without, _, _, *behind in bays.cells():
+        assert without.endswith("%")
+        assert set(behind) <= {"-", "\N{EN DASH}"}
+
+
+def test_a_response_without_a_bay_counts_as_0_and_that_is_said(cache: Path) -> None:
+    scenario = site("other", objective={"kind": "response"})
+    found = evaluate_layout(scenario, WALLS, threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
+    note = "front: no bay of its facade has a load: its response counts as 0"
+    assert note in found.notes
+    assert found.loads.tolist() == [[0.0]]
+    hidden = site("porch", objective={"kind": "response"})
+    with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front: no air"):
+        evaluate_layout(hidden, (), threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
+
+
+def test_the_worst_charge_is_found_where_a_building_is_hidden_under_another(cache: Path) -> None:
+    """As by pieces that stand under one charge and fall under the other."""
+    scenario, heavier = site("other", "house"), CHARGE._replace(tnt_kg=40.0)
+    threats = [LoadCase(CHARGE), LoadCase(heavier)]
+    campaign = Campaign.on(scenario, {"no barrier": ()}, threats, ENGINE, None, cache)
+    judged = consequences_of(campaign.run())
+    assert judged.worst_number == 1
+    hidden = replace(judged, responses=judged.responses[1:])
+    assert hidden.worst_number == 1
+    assert hidden.under(0).buildings == ("house",)
+    assert hidden.under(1).buildings == ("front", "house")
