@@ -102,8 +102,11 @@ def assessment(
         yield from impulse_lines(error)
         yield from lines(_levels_changed(blasts, judged))
     yield response_table(blasts, found)
+    said = [*judged.notes, *_engine_notes(blasts, blasts.judged)]
     for name, own in [*found.items()][:-1]:
         yield from lines((f"flag, {name}: {note}" for note in own.notes), "flag")
+        notes = _engine_notes(blasts, name, [*said, *own.notes])
+        yield from lines((f"note, {name}: {note}" for note in notes), "flag")
     yield from _neighbours(blasts, found)
     worst = judged.worst_barrier
     if worst is not None:
@@ -129,9 +132,25 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
     own = [threat.charge for threat in blasts.threats]
     left_out = *left_out_words(blasts.scenario, own), *without_facade_words(blasts.scenario)
     yield from lines((f"flag: {note}" for note in (*left_out, *judged.notes)), "flag")
+    notes = _engine_notes(blasts, blasts.judged, judged.notes)
+    yield from lines((f"note: {note}" for note in notes), "flag")
     if doubt := judged.doubt(target):
         yield Line.of(doubt)
     yield Line.of(judged.force_words)
+
+
+def _engine_notes(blasts: Blasts, name: str, said: Sequence[str] = ()) -> list[str]:
+    """Return the engine's notes on the blasts of a layout, such as of moved gauges, once each.
+
+    Those that are part of what was `said` are left out, and those of which a flag has an example.
+    """
+    notes = dict[str, None]()
+    for record in blasts.records[name]:
+        flagged = [why for _, why in record.complete.unchecked]
+        for note in record.complete.notes:
+            if not any(note in words for words in (*said, *flagged)):
+                notes[note] = None
+    return [*notes]
 
 
 def cells_words(error: GridError) -> str:

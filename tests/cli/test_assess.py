@@ -71,6 +71,20 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(site: Path) -> None:
     assert not any(line.endswith("complies") for line in lines)
 
 
+def test_notes_on_gauges_are_printed_once(tmp_path: Path) -> None:
+    """As in the report and on the page; what a flag says is not said again."""
+    document = glazed_hut().model_dump(mode="json", exclude_none=True)
+    inside_m = [document["structures"][0]["corner_m"][k] + s for k, s in enumerate((0.4, 1.0))]
+    document["gauges"] = [{"name": "buried", "position_m": [*inside_m, 1.0]}]
+    path = tmp_path / "hut.toml"
+    blast_env.save_scenario(Scenario.from_document(document, "hut"), path)
+    lines = run(path, "--cells", "coarse", "--charges", "2").splitlines()
+    (note,) = (line for line in lines if "buried" in line)
+    assert note.startswith("note: gauge buried: lies inside a solid; its load is that of the near")
+    assert not any("validated range" in line for line in lines if line.startswith("note: "))
+    assert sum("cells per m/kg" in line for line in lines if line.startswith("flag: ")) == 1
+
+
 def test_a_site_without_facades() -> None:
     output = run("control_room")
     assert "no structure has a facade with bays" in output
