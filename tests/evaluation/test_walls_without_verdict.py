@@ -20,6 +20,7 @@ from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.questions.capacity import capacity
+from blast_env.evaluation.questions.probability import scaled_to
 from blast_env.evaluation.questions.verdict import consequences_by_layout, consequences_of
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import write_layout
@@ -128,6 +129,27 @@ def test_a_report_names_it_and_shows_its_bays_without_the_layout(cache: Path) ->
     for _, without, _, _, *behind in bays.cells():
         assert without.endswith("%")
         assert set(behind) <= {"-", "\N{EN DASH}"}
+
+
+def test_walls_behind_a_gap_that_a_piece_fills_are_named_wherever_a_verdict_is(
+    cache: Path,
+) -> None:
+    """One of the two walls: half of the front has no load, and the rest has a verdict."""
+    scenario = site("other", "house")
+    blasts = blasts_of(scenario, WALLS[:1], cache)
+    found = consequences_by_layout(blasts)
+    judged, words = found["layout"], FILLED.replace("12.0", "6.0", 1)
+    parts = Document.of(assess.assessment(blasts, found, LevelOfProtection.LOW, 0.1)).parts
+    said = [part.text() for part in parts if isinstance(part, Line)]
+    assert sum(words in line for line in said) == 1
+    assert any(line.startswith(f"flag: {words}") for line in said)
+    verdicts = compare.building_verdicts(judged)
+    table = compare.verdict_table(scenario, [("A", "T1", verdicts)])
+    own, words = words.split(": ")
+    assert [row[2] for row in table.cells() if words in row[-1]] == [own]
+    assert f"{own}: {words}" in " ".join(scaled_to(judged, CHARGE).notes)
+    bare = compare.building_verdicts(found["no barrier"])
+    assert not any("have no load" in flag for own in bare for flag in own.flags)
 
 
 def test_a_response_without_a_bay_counts_as_0_and_that_is_said(cache: Path) -> None:
