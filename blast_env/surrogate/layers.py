@@ -18,6 +18,7 @@ from blast_env.gas.simd import fill, get, lanes_at, larger, load, own_frame, pla
 from blast_env.gas.state import FUSED
 
 SingleArray = NDArray[np.float32]
+HalfArray = NDArray[np.float16]
 
 ROWS_AT_ONCE: Final = 4
 """Rows that pass through a layer together."""

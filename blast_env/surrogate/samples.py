@@ -8,20 +8,17 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
-from blast_env.surrogate.layers import SingleArray
+from blast_env.surrogate.layers import HalfArray, SingleArray
 from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import site_of
-
-HalfArray = NDArray[np.float16]
 
 _BLOCK: Final = 2**20
 """Rows of relations that are copied at once."""
