@@ -200,8 +200,7 @@ class BuildZone(Section):
     @property
     def rectangle_m(self) -> Rectangle:
         """The whole zone."""
-        size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
-        return Rectangle.from_corner(self.corner_m, size)
+        return self.cells_rectangle_m(0, 0, self.rows, self.columns)
 
     @property
     def shape(self) -> tuple[int, int]:

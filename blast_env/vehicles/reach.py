@@ -30,6 +30,9 @@ _MOST_STEPS: Final = 1000
 Steps = NDArray[np.int64]
 """Lengths in micrometres."""
 
+_Ends = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""The first row or column of each of several rectangles, and the one after the last."""
+
 
 def places_on(site: Site) -> int:
     """Return the number of places of a vehicle's charge on a site without obstacles."""
@@ -97,20 +100,13 @@ class Reach:
             columns: Points to the right, from the left border.
             step_m: Spacing of the points.
         """
-        # Each part is a rectangle of points: differences at its corners, then two cumulative sums.
-        row, column = np.nonzero(self.reached)
-        count = np.zeros((rows + 1, columns + 1), dtype=np.int64)
-        ends = []
+        row, column = np.nonzero(self.reached)  # each part is a rectangle of points
+        ends = list[_Ends]()
         for cuts_m, index, most in ((self.y_m, row, rows), (self.x_m, column, columns)):
             low = np.ceil(cuts_m[index // 2] / step_m - 0.5 - 1e-6).astype(np.intp)
             high = np.floor(cuts_m[(index + 1) // 2] / step_m + 0.5 + 1e-6).astype(np.intp) + 1
             ends.append((low.clip(0, most), high.clip(0, most)))
-        (bottom, top), (left, right) = ends
-        for y, sign in ((bottom, 1), (top, -1)):
-            np.add.at(count, (y, left), sign)
-            np.add.at(count, (y, right), -sign)
-        near: BoolArray = count.cumsum(axis=0).cumsum(axis=1)[:rows, :columns] > 0
-        return near
+        return _covered(rows, columns, *ends)
 
     def touches(self, rectangle: Rectangle) -> tuple[bool, bool, bool, bool]:
         """Return whether it reaches the left, lower, right and upper side of a rectangle."""
@@ -141,15 +137,20 @@ class Reach:
             columns: Squares to the right.
         """
         row, column = np.nonzero(self.reached)
-        left, right = _squares(self.x_m, column, self.width_m, columns)
-        bottom, top = _squares(self.y_m, row, self.width_m, rows)
-        # Two cumulative sums over the corners of rectangles count those that cover a square.
-        counts = np.zeros((rows + 1, columns + 1), dtype=np.int64)
-        for y, sign in ((bottom, 1), (top, -1)):
-            np.add.at(counts, (y, left), sign)
-            np.add.at(counts, (y, right), -sign)
-        covered: BoolArray = counts.cumsum(axis=0).cumsum(axis=1)[:rows, :columns] > 0
-        return covered
+        upwards = _squares(self.y_m, row, self.width_m, rows)
+        across = _squares(self.x_m, column, self.width_m, columns)
+        return _covered(rows, columns, upwards, across)
+
+
+def _covered(rows: int, columns: int, upwards: _Ends, across: _Ends) -> BoolArray:
+    """Return which squares of a grid rectangles cover, by the ends of their rows and columns."""
+    # Differences at the corners of rectangles, then two cumulative sums: how many cover a square.
+    counts = np.zeros((rows + 1, columns + 1), dtype=np.int64)
+    for y, sign in zip(upwards, (1, -1), strict=True):
+        for x, other in zip(across, (1, -1), strict=True):
+            np.add.at(counts, (y, x), sign * other)
+    covered: BoolArray = counts.cumsum(axis=0).cumsum(axis=1)[:rows, :columns] > 0
+    return covered
 
 
 def _parts(cuts_m: FloatArray, values_m: FloatArray) -> NDArray[np.intp]:
@@ -165,9 +166,7 @@ def _inner_parts(cuts_m: FloatArray, low_m: float, high_m: float) -> slice:
     return slice(max(first, 0), after)
 
 
-def _squares(
-    cuts_m: FloatArray, index: NDArray[np.intp], width_m: float, count: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _squares(cuts_m: FloatArray, index: NDArray[np.intp], width_m: float, count: int) -> _Ends:
     """Return the first square covered from each part of the plane, and the one after the last."""
     low_m = cuts_m[index // 2] - width_m / 2.0
     high_m = cuts_m[(index + 1) // 2] + width_m / 2.0
