@@ -211,7 +211,7 @@ def shares_of(
         )
     ]
     if not of_layout[0] > 0.0:
-        raise BlastEnvError(f"{case.name or case.scenario.name}: nothing arrives without a barrier")
+        raise BlastEnvError(f"{case.label}: nothing arrives without a barrier")
     return [load / of_layout[0] for load in of_layout[1:]]
 
 

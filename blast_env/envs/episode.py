@@ -4,6 +4,7 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from math import isnan
 from typing import Any, Final
 
 import numpy as np
@@ -31,7 +32,7 @@ from blast_env.envs.strategies import (
     check_size,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, check_loaded
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import (
     Assessment,
@@ -619,6 +620,8 @@ class Episodes:
             own = [next(loads) for _ in episode.case.threats]
             episode.loads[layout] = Assessment.of(episode.case, layout, own)
             if not layout:
+                if isnan(episode.loads[()].load):
+                    check_loaded(episode.case, own[0].without_load)
                 _keep(episode.site.bare, episode.loads_key, episode.loads[()])
 
     def rewards(self, indices: Sequence[int]) -> FloatArray:

@@ -233,6 +233,11 @@ class LoadCaseSet:
         return tuple(threat.charge_against(self.scenario, layout) for threat in threats)
 
     @property
+    def label(self) -> str:
+        """Its name, else that of the scenario."""
+        return self.name or self.scenario.name
+
+    @property
     def is_mean(self) -> bool:
         """Whether the risk measure is the mean over the charges."""
         return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
@@ -339,17 +344,21 @@ def check_something_arrives(
     """
     means = np.atleast_2d(unprotected).mean(axis=1)
     for case, mean, names in zip(cases, means, without_load, strict=True):
-        name = case.name or case.scenario.name
-        if np.isnan(mean) or (names and not mean > 0.0):
+        if not mean > 0.0:  # or not a number
+            check_loaded(case, names)
             raise BlastEnvError(
-                f"{name}: no load without a barrier on {', '.join(names)}: no air touches the "
-                "assessed walls"
-            )
-        if not mean > 0.0:
-            raise BlastEnvError(
-                f"{name}: nothing arrives at the protected structures "
+                f"{case.label}: nothing arrives at the protected structures "
                 f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
             )
+
+
+def check_loaded(case: LoadCaseSet, without_load: Sequence[str]) -> None:
+    """Refuse a case with protected buildings without a load where no barrier stands."""
+    if without_load:
+        raise BlastEnvError(
+            f"{case.label}: no load without a barrier on {', '.join(without_load)}: no air touches"
+            " the assessed walls"
+        )
 
 
 def _spread_first(charges: Sequence[AnyCharge]) -> list[AnyCharge]:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
-from math import nan
+from math import isnan, nan
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self, TypeVar
@@ -567,5 +567,10 @@ class Assessment:
         return self.impulse_pa_s / PA_PER_PSI
 
     def reduction_from(self, unprotected: "Assessment") -> float:
-        """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
-        return 1.0 - self.load / unprotected.load if unprotected.load > 0.0 else nan
+        """Return the relative reduction of `load` from no barrier; NaN if that load is 0.
+
+        It is 0 where pieces hide a building, whose load is then not known.
+        """
+        if not unprotected.load > 0.0:
+            return nan
+        return 0.0 if isnan(self.load) else 1.0 - self.load / unprotected.load

@@ -200,7 +200,8 @@ class BuildZone(Section):
     @property
     def rectangle_m(self) -> Rectangle:
         """The whole zone."""
-        return self.cells_rectangle_m(0, 0, self.rows, self.columns)
+        size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
+        return Rectangle.from_corner(self.corner_m, size)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -8,14 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+import gymnasium as gym
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from blast_env.answers import Document, Line, Table, assess, compare
 from blast_env.answers.report import Limit, Report, StudyOptions, report_document, run_report
 from blast_env.cli import app
+from blast_env.design.search import DesignProblem, PopulationAnnealingSearch, RandomSearch
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
@@ -174,3 +177,35 @@ def test_the_worst_charge_is_found_where_a_building_is_hidden_under_another(cach
     assert hidden.worst_number == 1
     assert hidden.under(0).buildings == ("house",)
     assert hidden.under(1).buildings == ("front", "house")
+
+
+@pytest.mark.parametrize("method", [RandomSearch(initial=(WALLS,)), PopulationAnnealingSearch()])
+def test_no_search_ends_at_a_layout_that_hides_a_building(
+    method: RandomSearch | PopulationAnnealingSearch, cache: Path
+) -> None:
+    """Its load is not a number, which is no better than any."""
+    evaluator = BlastEvaluator(site("other"), ENGINE, cache=cache)
+    problem = DesignProblem(evaluator, LoadCaseSet(evaluator.scenario, (LoadCase(CHARGE),)))
+    found = method.propose(problem, 6)
+    assert found.blasts > 1
+    assert found.load is not None
+    assert problem.load(found.layout) == found.load
+    assert np.isnan(problem.load(WALLS))
+
+
+@pytest.mark.parametrize("reward", ["terminal", "incremental", "relative"])
+def test_no_reward_is_paid_for_hiding_a_building(reward: str) -> None:
+    env = gym.make("BlastBarrierGas-v0", scenario=site("other"), reward=reward)
+    env.reset(seed=0, options={"layout": WALLS})
+    _, paid, ended, _, info = env.step(env.get_wrapper_attr("finish"))
+    assert ended
+    assert np.isnan(info["impulse_pa_s"])
+    assert info["reduction"] == 0.0
+    assert paid == {"terminal": -1.0, "incremental": -1.0, "relative": 0.0}[reward]
+
+
+def test_no_episode_ends_where_a_building_is_hidden_without_a_barrier() -> None:
+    env = gym.make("BlastBarrierGas-v0", scenario=site("porch"))
+    env.reset(seed=0)
+    with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front"):
+        env.step(env.get_wrapper_attr("finish"))

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import isnan
 from typing import ClassVar, Final
 
 import numpy as np
@@ -79,6 +80,10 @@ _MOST_REPEATS: Final = 300
 """Successive assessments without a new blast after which the search ends."""
 
 
+_OF_HIDING: Final = 2.0
+"""The load that a method is told of a layout without one, over the largest without a barrier."""
+
+
 class SearchEndedError(Exception):
     """The blasts of a search are spent, or it finds no new layouts to spend them on."""
 
@@ -126,6 +131,7 @@ class SearchSession:
         self._known: dict[Layout, tuple[float, ...]] = {}
         self._met: set[tuple[Layout, int]] = set()
         self._history: list[Candidate] = []
+        self._hiding: set[Layout] = set()
         self._repeats = 0
 
     @property
@@ -219,6 +225,7 @@ class SearchSession:
     def ranked(self, threats: int) -> list[Layout]:
         """Return the layouts assessed under at least so many threats, least load first."""
         met = [key for key, values in self._known.items() if len(values) >= threats]
+        met = [key for key in met if key not in self._hiding]
         return sorted(met, key=lambda key: self._load(key, threats))
 
     def front(self) -> tuple[Candidate, ...]:
@@ -297,7 +304,11 @@ class SearchSession:
         if not pairs:
             return
         for (key, _), load in zip(pairs, self.problem.loads(pairs), strict=True):
-            self._known[key] = (*self._known.get(key, ()), load)
+            counted = load
+            if isnan(load):  # pieces hide a building: such a layout is never the best
+                self._hiding.add(key)
+                counted = _OF_HIDING * max(self.problem.unprotected)
+            self._known[key] = (*self._known.get(key, ()), counted)
         self._met |= new
         self.blasts += len(new)
         for key in layouts:
@@ -307,6 +318,8 @@ class SearchSession:
 
     def _consider(self, key: Layout) -> None:
         """Record a layout as the best one if it ranks before the present best."""
+        if key in self._hiding:
+            return
         # More threats rank first: a load under few of them may be luck.
         threats = len(self._known[key])
         candidate = self._candidate(key, threats)
