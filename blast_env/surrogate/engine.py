@@ -26,6 +26,7 @@ SURROGATE: Final = "surrogate"
 
 _NOTES: Final = ("a prediction of the surrogate, not a blast",)
 _GUESSED: Final = Validation(ValidationStatus.APPROXIMATE, "a guess of gas dynamics")
+_NAMED: Final = 5  # structures in one sentence
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
@@ -132,9 +133,14 @@ class SurrogateEngine(Engine):
         """Return whether the objective counts overpressures, else none are predicted."""
         return scenario.objective.needs_peaks
 
-    def caveats(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
-        """Return that these are no blasts."""
-        return ("These are predictions of a surrogate, not blasts: judge with engine 'gas'.",)
+    def caveats(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return that these are no blasts, and which structures have no prediction."""
+        no_blasts = "These are predictions of a surrogate, not blasts: judge with engine 'gas'."
+        others = [own.name for own in scenario.structures if not own.protected]
+        if not others:
+            return (no_blasts,)
+        names = ", ".join(others[:_NAMED]) + ", ..." * (len(others) > _NAMED)
+        return no_blasts, f"{names}: not protected, so not predicted: the 0 there is no load"
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks."""
