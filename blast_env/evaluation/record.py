@@ -197,17 +197,21 @@ class BlastLoads:
     ) -> "BlastLoads":
         """Return the loads with the response of given facades, without another blast.
 
-        That of a structure of which no air touches a bay is 0.
+        That of a structure of which no air touches a bay is 0, or NaN, as its load, if no air
+        touches the building.
 
         Raises:
             BlastEnvError: If the bays were not recorded.
         """
         if not self.bays and not self._hides({own.bay.structure for own in named}):
             raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
+        glazed, hidden = {own.bay.structure for own in named}, self.without_load
         responded = []
         for load in self.structures:
             own = [bay for bay in self.bays if bay.structure == load.name]
             response, most = structure_response(own, named, objective)
+            if load.name in glazed and load.building in hidden:
+                response = np.nan
             responded.append(replace(load, response=response, worst_damage=most))
         return replace(self, structures=tuple(responded))
 

@@ -212,7 +212,7 @@ class ObjectiveSection(Section):
             return combined
         # Costs are shares of the budget and at most 1: any layout that reaches the target is better
         # than all that miss it.
-        return 1.0 + combined if combined > 0.0 else cost_share
+        return cost_share if combined <= 0.0 else 1.0 + combined
 
     def load(
         self,

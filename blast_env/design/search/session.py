@@ -80,10 +80,6 @@ _MOST_REPEATS: Final = 300
 """Successive assessments without a new blast after which the search ends."""
 
 
-_OF_HIDING: Final = 2.0
-"""The load that a method is told of a layout without one, over the largest without a barrier."""
-
-
 class SearchEndedError(Exception):
     """The blasts of a search are spent, or it finds no new layouts to spend them on."""
 
@@ -132,6 +128,7 @@ class SearchSession:
         self._met: set[tuple[Layout, int]] = set()
         self._history: list[Candidate] = []
         self._hiding: set[Layout] = set()
+        self._largest = 0.0
         self._repeats = 0
 
     @property
@@ -307,7 +304,8 @@ class SearchSession:
             counted = load
             if isnan(load):  # pieces hide a building: such a layout is never the best
                 self._hiding.add(key)
-                counted = _OF_HIDING * max(self.problem.unprotected)
+                counted = 1.0 + 2.0 * self._largest
+            self._largest = max(self._largest, load)
             self._known[key] = (*self._known.get(key, ()), counted)
         self._met |= new
         self.blasts += len(new)

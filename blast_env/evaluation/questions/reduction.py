@@ -554,10 +554,14 @@ class Evaluation:
 
     @property
     def _without_bays(self) -> tuple[str, ...]:
-        """The protected structures with a facade of which no bay has a load behind the layout."""
-        bays = self.blasts.records[self.blasts.judged][0].loads.bays
-        loaded = {bay.structure for bay in bays}
+        """The protected parts of buildings whose facade has no bay with a load behind the layout.
+
+        A building that pieces hide has no load at all, and no response.
+        """
+        loads = self.blasts.records[self.blasts.judged][0].loads
+        loaded = {bay.structure for bay in loads.bays}
         own = (part for part in self.scenario.structures if part.protected and part.facade)
+        own = (part for part in own if part.building_name not in loads.without_load)
         return tuple(part.name for part in own if part.name not in loaded)
 
     def to_dict(self) -> dict[str, Any]:
