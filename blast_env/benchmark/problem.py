@@ -14,6 +14,7 @@ from blast_env.benchmark.space import LayoutSpace
 from blast_env.design.search import Candidate, DesignProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastStore, BudgetError, LoadCase, LoadCaseSet
+from blast_env.evaluation.cases import check_loaded
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
@@ -195,24 +196,26 @@ def shares_of(
 ) -> list[float]:
     """Return the objective of each layout relative to that without a barrier.
 
+    It is 1, that of nothing, for a layout that hides a protected building, whose load is no number.
+
     Args:
         case: The case, with its threats.
         evaluator: Runs the blasts.
         processes: Number of worker processes.
     """
     pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
-    loads = [
-        load.load(case.scenario.objective) for load in evaluator.loads_of_many(pairs, processes)
-    ]
+    found = evaluator.loads_of_many(pairs, processes)
+    loads = [load.load(case.scenario.objective) for load in found]
     of_layout = [
         case.objective_value(own, layout)
         for layout, own in zip(
             ((), *layouts), np.reshape(loads, (-1, len(case.threats))), strict=True
         )
     ]
-    if not of_layout[0] > 0.0:
+    if not of_layout[0] > 0.0:  # or not a number
+        check_loaded(case, found[0].without_load)
         raise BlastEnvError(f"{case.label}: nothing arrives without a barrier")
-    return [load / of_layout[0] for load in of_layout[1:]]
+    return [1.0 if np.isnan(load) else load / of_layout[0] for load in of_layout[1:]]
 
 
 def make(

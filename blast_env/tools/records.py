@@ -199,7 +199,9 @@ class BuildingLoad(Record):
 
     threat: Annotated[int, Field(description="Number of the threat in `look`, from 0.")]
     building: str
-    impulse_pa_s: float
+    impulse_pa_s: Annotated[
+        float | None, Field(description="None where pieces hide its walls: no load is known.")
+    ]
     peak_pa: float | None
     validity: str
 

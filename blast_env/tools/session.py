@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as WaitedTooLong
 from functools import cached_property, partial
+from math import isnan
 from pathlib import Path
 from threading import RLock
 from time import monotonic
@@ -351,7 +352,7 @@ class Session:
             BuildingLoad(
                 threat=number,
                 building=load.name,
-                impulse_pa_s=load.impulse_pa_s,
+                impulse_pa_s=None if isnan(load.impulse_pa_s) else load.impulse_pa_s,
                 peak_pa=load.peak_pa,
                 validity=load.validation.words,
             )

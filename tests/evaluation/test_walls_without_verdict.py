@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from blast_env.answers import Document, Line, Table, assess, compare
 from blast_env.answers.report import Limit, Report, StudyOptions, report_document, run_report
+from blast_env.benchmark import Definition, make
 from blast_env.cli import app
 from blast_env.design.search import DesignProblem, PopulationAnnealingSearch, RandomSearch
 from blast_env.errors import BlastEnvError
@@ -22,7 +23,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.questions.capacity import capacity
+from blast_env.evaluation.questions import capacity
 from blast_env.evaluation.questions.probability import scaled_to
 from blast_env.evaluation.questions.verdict import consequences_by_layout, consequences_of
 from blast_env.geometry import Layout, Piece
@@ -87,7 +88,7 @@ def test_where_nothing_can_be_judged_the_error_names_buildings_and_reasons(
     assert (FILLED in said) == bool(layout)
     evaluator = BlastEvaluator(scenario, ENGINE, cache=cache)
     with pytest.raises(BlastEnvError, match="there is no level of protection: front: no air"):
-        capacity(evaluator, {"": layout}, [CHARGE])
+        capacity.capacity(evaluator, {"": layout}, [CHARGE])
 
 
 def test_a_verdict_on_the_others_is_flagged_with_the_building(cache: Path) -> None:
@@ -214,3 +215,13 @@ def test_no_episode_ends_where_a_building_is_hidden_without_a_barrier() -> None:
     env.reset(seed=0)
     with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front"):
         env.step(env.get_wrapper_attr("finish"))
+
+
+def test_the_benchmark_counts_a_layout_that_hides_a_building_as_nothing(cache: Path) -> None:
+    definition = Definition("lane", "known")
+    vars(definition)["scenario"] = site("other")
+    problem = make(definition, 4, engine=ENGINE, cache=cache)
+    assert problem.evaluate(WALLS) == 1.0
+    problem.evaluate(WALLS[:1])
+    assert problem.best is not None
+    assert np.isfinite(problem.best.share)
