@@ -81,7 +81,7 @@ def _four_rows(bend: Any) -> Any:
             first: Index of the first of them.
             inputs: Number of inputs.
             weight: Place of the weights (inputs, outputs).
-            outputs: Number of outputs, a multiple of 32.
+            outputs: Number of outputs, a multiple of 16.
             base: Place of what is added to the sums: biases, or biases and part of the sums.
             bases: The first entry of each row in it (4,).
             total: Place of the outputs of the rows.
@@ -94,7 +94,7 @@ def _four_rows(bend: Any) -> Any:
         base_0, base_1, base_2, base_3 = bases
         to_0, to_1, to_2, to_3 = to, to + outputs, to + 2 * outputs, to + 3 * outputs
         for output in range(0, outputs, 2 * lanes):
-            above = output + lanes
+            above = min(output + lanes, outputs - lanes)  # the last vector, if it is alone, twice
             low_0, high_0 = load(base, base_0 + output), load(base, base_0 + above)
             low_1, high_1 = load(base, base_1 + output), load(base, base_1 + above)
             low_2, high_2 = load(base, base_2 + output), load(base, base_2 + above)
@@ -175,7 +175,7 @@ def two_layers(
 
     Args:
         rows: Rows of each member, or of all (members or 1, rows, inputs).
-        first: Weights of the first layer (members, inputs, width); widths are multiples of 32.
+        first: Weights of the first layer (members, inputs, width); widths are multiples of 16.
         first_bias: Its biases (members, width).
         second: Weights of the second layer (members, width, outputs).
         second_bias: Its biases (members, outputs).
@@ -183,7 +183,8 @@ def two_layers(
     given = np.pad(rows, ((0, 0), (0, whole(rows.shape[1]) - rows.shape[1]), (0, 0)))
     found = np.empty((len(second), given.shape[1], second.shape[2]), dtype=np.float32)
     middle = np.empty((ROWS_AT_ONCE, second.shape[1]), dtype=np.float32)
-    put_two_layers(given, first, first_bias, second, second_bias, middle, found)
+    biases, of_rows = first_bias[:, np.newaxis], np.zeros(given.shape[1], dtype=np.int32)
+    put_two_layers(given, first, biases, of_rows, second, second_bias, middle, found)
     return found[:, : rows.shape[1]]
 
 
@@ -194,31 +195,68 @@ def whole(rows: int) -> int:
 
 
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
+def put_sums(rows: Any, weight: Any, bias: Any, found: Any) -> None:
+    """Put the sums of a layer over its first inputs, of a whole number of rows.
+
+    Args:
+        rows: The inputs (rows, inputs).
+        weight: Weights of the layer, of at least as many inputs (members, inputs, width).
+        bias: Its biases (members, width).
+        found: The sums (members, rows, width).
+    """
+    own_frame()
+    members, count, width = found.shape
+    at, end, inputs, same = place(rows), place(found), rows.shape[1], (0, 0, 0, 0)
+    for member in range(members):
+        to, biases = place(weight[member]), place(bias[member])
+        for row in range(0, count, ROWS_AT_ONCE):
+            first = (member * count + row) * width
+            four_sums(at, row * inputs, inputs, to, width, biases, same, end, first)
+
+
+@compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def put_two_layers(
     rows: Any,
     first: Any,
-    first_bias: Any,
+    sums: Any,
+    of_rows: Any,
     second: Any,
     second_bias: Any,
     middle: Any,
     found: Any,
 ) -> None:
-    """Put the outputs of two layers, of a whole number of rows; see `two_layers`.
+    """Put the outputs of two layers, of a whole number of rows.
 
     Compiled code that makes an array itself frees it after its last mention, which is where its
     place in memory is asked for: `middle` has room for four rows between the layers.
+
+    Args:
+        rows: The last inputs of each row, by each member or by all (members or 1, rows, inputs).
+        first: Weights of the first layer, of all inputs (members, inputs, width).
+        sums: Its biases, and its sums over the other inputs if there are any, which several rows
+            may have in common (members, n, width).
+        of_rows: Which of these is that of each row (rows,).
+        second: See `two_layers`.
+        second_bias: See `two_layers`.
+        middle: Room for four rows (4, width).
+        found: The outputs (members, rows, outputs).
     """
     own_frame()
     members, width, outputs = second.shape
     count, inputs = rows.shape[1:]
-    at, between, end = place(rows), place(middle), place(found)
+    at, between, end, shared = place(rows), place(middle), place(found), place(sums)
     same = 0, 0, 0, 0
     for member in range(members):
         own = member * count * inputs if len(rows) > 1 else 0
-        weights = place(first[member]), place(second[member])
-        biases = place(first_bias[member]), place(second_bias[member])
+        to_first, to_second = place(first[member, first.shape[1] - inputs :]), place(second[member])
+        bias, of_member = place(second_bias[member]), member * sums.shape[1]
         for row in range(0, count, ROWS_AT_ONCE):
-            to = (member * count + row) * outputs
-            given = own + row * inputs
-            four_rows(at, given, inputs, weights[0], width, biases[0], same, between, 0)
-            four_rows(between, 0, width, weights[1], outputs, biases[1], same, end, to)
+            to, given = (member * count + row) * outputs, own + row * inputs
+            bases = (
+                (of_member + of_rows[row]) * width,
+                (of_member + of_rows[row + 1]) * width,
+                (of_member + of_rows[row + 2]) * width,
+                (of_member + of_rows[row + 3]) * width,
+            )
+            four_rows(at, given, inputs, to_first, width, shared, bases, between, 0)
+            four_rows(between, 0, width, to_second, outputs, bias, same, end, to)

@@ -27,12 +27,19 @@ from blast_env.surrogate.layers import (
     four_rows,
     four_sums,
     put_parts,
+    put_sums,
     put_two_layers,
     whole,
 )
 from blast_env.surrogate.neighbours import TRAITS, put_traits
 from blast_env.surrogate.points import WallPoints
-from blast_env.surrogate.relations import RELATIONS, put_relations
+from blast_env.surrogate.relations import (
+    IN_PLAN,
+    RELATIONS,
+    RISING,
+    is_above,
+    put_relations,
+)
 from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, SINGLE, Counts, Room
 from blast_env.surrogate.ways import (
     ASIDE_M,
@@ -63,17 +70,18 @@ class NetworkLayers(NamedTuple):
     """The layers of a stack of networks, in single precision.
 
     Attributes:
-        send: Weights of the first layer of messages of structures (members, RELATIONS, length).
-        send_bias: Its biases (members, length).
-        message: Weights of the second layer of these messages (members, length, length).
+        send: Weights of the first layer of messages of structures, of relations in plan before
+            those that change with height (members, RELATIONS, width of messages).
+        send_bias: Its biases (members, width of messages).
+        message: Weights of the second layer of these messages (members, width, length).
         message_bias: Its biases (members, length).
         piece_send: The same for messages of pieces.
         piece_send_bias: The same.
         piece_message: The same.
         piece_message_bias: The same.
-        trait: Weights of the first layer of the weights of messages (members, TRAITS, length).
-        trait_bias: Its biases (members, length).
-        weight: Weights of the second layer of these (members, length, length).
+        trait: Weights of the first layer of the weights of messages (members, TRAITS, width).
+        trait_bias: Its biases (members, width).
+        weight: Weights of the second layer of these (members, width, length).
         weight_bias: Its biases (members, length).
         constant: Weights of the first layer at points, of inputs that no layout changes and of the
             messages of structures (members, n + length, width).
@@ -116,12 +124,12 @@ class Scales(NamedTuple):
 
     Attributes:
         mean: Means of features, then of relations, then of traits.
-        scale: Standard deviations.
+        by: Reciprocals of standard deviations.
         most: The bound.
     """
 
     mean: FloatArray
-    scale: FloatArray
+    by: FloatArray
     most: float
 
 
@@ -157,11 +165,14 @@ class Bench(NamedTuple):
 
     Attributes:
         relations: Relations of pieces (pieces, points, RELATIONS).
-        related: Scaled relations of solids, one row after the other (n,).
+        in_plan: Their scaled relations in plan, of one column of points after the other (n,).
+        rising: The same of those that change with height, of one point after the other (n,).
+        columns: The column of each of these (n,).
+        sums: Sums over relations in plan, of one column after the other (n,).
         of_structures: Messages of structures (members, structures, rows, length).
         constants: Inputs of the first layer that no layout changes (rows, n + length).
         given: Open shares and messages of rows (n,).
-        middle: Four rows between the layers of messages (4, length).
+        middle: Four rows between the layers of messages, or of their weights (n,).
         between: Four rows after the first layer (4, width).
         beyond: The same after the second one (4, width).
         parts: Parts of the sums of the last layer (4, PARTS).
@@ -172,7 +183,10 @@ class Bench(NamedTuple):
     """
 
     relations: FloatArray
-    related: SingleArray
+    in_plan: SingleArray
+    rising: SingleArray
+    columns: Numbers
+    sums: SingleArray
     of_structures: SingleArray
     constants: SingleArray
     given: SingleArray
@@ -198,14 +212,18 @@ class Bench(NamedTuple):
         """Return the arrays for a number of new pieces, and a largest number in a layout."""
         members, _, length = layers.message.shape
         rows, (_, inputs, width) = whole(points), layers.constant.shape
-        solids = max(structures, pieces)
+        solids, between = max(structures, pieces), layers.message.shape[1]
+        columns, widest = whole(solids * points), max(between, layers.weight.shape[1])
         return cls(
             room("relations of pieces", (pieces, points, RELATIONS), FLOAT),
-            room("related", (solids * rows * RELATIONS,), SINGLE),
+            room("relations in plan", (columns * len(IN_PLAN),), SINGLE),
+            room("relations that rise", (solids * rows * len(RISING),), SINGLE),
+            room("columns of points", (max(solids * rows, whole(most)),), INTEGER),
+            room("sums in plan", (columns * between,), SINGLE),
             room("messages of structures", (members, structures, rows, length), SINGLE),
             room("constants", (rows, inputs), SINGLE),
             room("given", (rows * layers.first.shape[1],), SINGLE),
-            room("middle", (ROWS_AT_ONCE, length), SINGLE),
+            room("middle", (ROWS_AT_ONCE * widest,), SINGLE),
             room("between", (ROWS_AT_ONCE, width), SINGLE),
             room("beyond", (ROWS_AT_ONCE, width), SINGLE),
             room("parts", (ROWS_AT_ONCE, PARTS), SINGLE),
@@ -348,7 +366,7 @@ def put_charge(
     )
     said = bench.of_structures
     sending = layers.send, layers.send_bias, layers.message, layers.message_bias
-    _put_messages(own.relations, scales, sending, bench, said)
+    _put_messages(own.relations, site.points, scales, sending, bench, said)
     _put_base(own.features, scales, said, layers.constant, layers.first_bias, bench.constants, base)
     return farthest_m
 
@@ -384,12 +402,20 @@ def put_pieces(
     put_relations(start_m, points.points_m, points.outward, scale_m, boxes, relations)
     first = layers.piece_send, layers.piece_send_bias
     sending = *first, layers.piece_message, layers.piece_message_bias
-    _put_messages(relations, scales, sending, bench, found.messages)
+    _put_messages(relations, points, scales, sending, bench, found.messages)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _scaled(value: float, scales: Scales, index: int) -> float:
+    """Return an input, scaled and bounded, by its index among all."""
+    own = (value - scales.mean[index]) * scales.by[index]
+    return float(min(max(own, -scales.most), scales.most))
 
 
 @njit(error_model="numpy")
 def _put_messages(
     relations: FloatArray,
+    points: WallPoints,
     scales: Scales,
     sending: tuple[SingleArray, SingleArray, SingleArray, SingleArray],
     bench: Bench,
@@ -397,17 +423,53 @@ def _put_messages(
 ) -> None:
     """Put the messages of solids (members, solids, rows, length); the last point fills up rows."""
     members, solids, rows, length = found.shape
-    related = bench.related
-    for solid in range(solids):
-        for row in range(rows):
-            point, first = min(row, relations.shape[1] - 1), (solid * rows + row) * RELATIONS
-            for index in range(RELATIONS):
-                value = relations[solid, point, index] - scales.mean[FEATURES + index]
-                scaled = value / scales.scale[FEATURES + index]
-                related[first + index] = min(max(scaled, -scales.most), scales.most)
-    given = related[: solids * rows * RELATIONS].reshape((1, solids * rows, RELATIONS))
+    send, send_bias, message, message_bias = sending
+    # The first layer is linear before its bend, so that sums over relations in plan are made once
+    # for all points one above the other.
+    count = _put_related(relations, points, scales, rows, bench)
+    of_columns, width = whole(count), send.shape[2]
+    in_plan = bench.in_plan[: of_columns * len(IN_PLAN)].reshape((of_columns, len(IN_PLAN)))
+    rising = bench.rising[: solids * rows * len(RISING)].reshape((1, solids * rows, len(RISING)))
+    sums = bench.sums[: of_columns * width].reshape((1, of_columns, width))
     said = found.reshape((members, solids * rows, length))
-    put_two_layers(given, *sending, bench.middle, said)
+    for member in range(members):
+        own = slice(member, member + 1)
+        put_sums(in_plan, send[own], send_bias[own], sums)
+        put_two_layers(
+            rising,
+            send[own],
+            sums,
+            bench.columns,
+            message[own],
+            message_bias[own],
+            bench.middle,
+            said[own],
+        )
+
+
+@njit(error_model="numpy")
+def _put_related(
+    relations: FloatArray, points: WallPoints, scales: Scales, rows: int, bench: Bench
+) -> int:
+    """Put the scaled relations of solids; return the number of columns of points, by each solid."""
+    columns = number = in_plan = rising = 0
+    for solid in range(len(relations)):
+        for row in range(rows):
+            point = min(row, relations.shape[1] - 1)
+            own = relations[solid, point]
+            if row == point and not is_above(points.points_m, points.outward, point):
+                for index in IN_PLAN:
+                    bench.in_plan[in_plan] = _scaled(own[index], scales, FEATURES + index)
+                    in_plan += 1
+                columns += 1
+            for index in RISING:
+                bench.rising[rising] = _scaled(own[index], scales, FEATURES + index)
+                rising += 1
+            bench.columns[number] = columns - 1
+            number += 1
+    for index in range(in_plan, whole(columns) * len(IN_PLAN)):  # up to a whole number of rows
+        bench.in_plan[index] = 0.0
+    return columns
 
 
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
@@ -431,9 +493,7 @@ def _put_base(
     lanes, same = lanes_at(to), (0, 0, 0, 0)
     for row in range(rows):
         for index in range(constant):
-            value = features[min(row, points - 1), index]
-            scaled = (value - scales.mean[index]) / scales.scale[index]
-            given[row, index] = min(max(scaled, -scales.most), scales.most)
+            given[row, index] = _scaled(features[min(row, points - 1), index], scales, index)
     for member in range(members):
         for row in range(rows):
             for index in range(0, length, lanes):
@@ -484,8 +544,7 @@ def _put_shares(
         put_shares_of(own_below, straight[point], charge.weights[point], shares)
         for share in range(SHARES):
             index = FEATURES - SHARES + share
-            scaled = (shares[share] - scales.mean[index]) / scales.scale[index]
-            given[point * inputs + share] = min(max(scaled, -scales.most), scales.most)
+            given[point * inputs + share] = _scaled(shares[share], scales, index)
     for row in range(points, rows):
         for share in range(SHARES):
             given[row * inputs + share] = given[(points - 1) * inputs + share]
@@ -520,17 +579,16 @@ def _put_weights(
     rows, number = whole(count), 0
     for row in range(rows):
         for trait in range(TRAITS):
-            index = FEATURES + RELATIONS + trait
-            scaled = (bench.traits[min(row, count - 1), trait] - scales.mean[index]) / (
-                scales.scale[index]
-            )
-            bench.told[number] = min(max(scaled, -scales.most), scales.most)
+            value = bench.traits[min(row, count - 1), trait]
+            bench.told[number] = _scaled(value, scales, FEATURES + RELATIONS + trait)
             number += 1
-    members, _, length = layers.weight.shape
+        bench.columns[row] = 0
+    members, width, length = layers.weight.shape
     put_two_layers(
         bench.told[:number].reshape((1, rows, TRAITS)),
         layers.trait,
-        layers.trait_bias,
+        layers.trait_bias.reshape((members, 1, width)),
+        bench.columns,
         layers.weight,
         layers.weight_bias,
         bench.middle,
@@ -580,22 +638,22 @@ def _put_heard(
     for number in range(first_row, first_row + ROWS_AT_ONCE):
         for index in range(0, length, 2 * lanes):
             low = high = fill(at, np.float32(0.0))
-            by = first_weight + index
+            above, by = min(index + lanes, length - lanes), first_weight
             for piece in own:
                 if piece == 0:
                     break
-                by_low, by_high = load(weights, by), load(weights, by + lanes)
+                by_low, by_high = load(weights, by + index), load(weights, by + above)
                 by += length
                 if piece > 0:
                     entry = ((member * of_kept + piece - 1) * rows + number) * length
                     low = load(said, entry + index) * by_low + low
-                    high = load(said, entry + index + lanes) * by_high + high
+                    high = load(said, entry + above) * by_high + high
                 else:
                     entry = ((member * of_new - piece - 1) * rows + number) * length
                     low = load(now_said, entry + index) * by_low + low
-                    high = load(now_said, entry + index + lanes) * by_high + high
+                    high = load(now_said, entry + above) * by_high + high
             store(at, number * inputs + SHARES + index, low)
-            store(at, number * inputs + SHARES + index + lanes, high)
+            store(at, number * inputs + SHARES + above, high)
 
 
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)

@@ -36,7 +36,7 @@ from blast_env.surrogate.loads import (
 )
 from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
-from blast_env.surrogate.relations import RELATIONS
+from blast_env.surrogate.relations import IN_PLAN, RELATIONS, RISING
 from blast_env.surrogate.rooms import Room, in_lines
 from blast_env.surrogate.walls import SurrogateSite
 from blast_env.surrogate.ways import SHARES
@@ -294,12 +294,16 @@ class Networks:
             kind: 0 for networks of impulses, 1 for those of peaks.
             power: Exponent of the mean over the walls.
         """
-        layers, members = self._layers, len(self.members)
+        layers, members, length = self._layers, len(self.members), self._layers.message.shape[2]
         constants, shares, structures, pieces = np.split(
-            layers.first, (FEATURES - SHARES, FEATURES, FEATURES + MESSAGE), axis=1
+            layers.first, (FEATURES - SHARES, FEATURES, FEATURES + length), axis=1
         )
+        # Sums over relations in plan are made first.
+        in_order = np.concatenate((IN_PLAN, RISING))
         arrays: list[Any] = [
-            *layers[: 2 * len(_SENDING) + len(_WEIGHING)],
+            *(layers.send[:, in_order], *layers[1 : len(_SENDING)]),
+            *(layers.piece_send[:, in_order], *layers[len(_SENDING) + 1 : 2 * len(_SENDING)]),
+            *layers[2 * len(_SENDING) : 2 * len(_SENDING) + len(_WEIGHING)],
             np.concatenate((constants, structures), axis=1),
             layers.first_bias,
             np.concatenate((shares, pieces), axis=1),
@@ -491,7 +495,7 @@ class Surrogate:
 
     @cached_property
     def _scales(self) -> Scales:
-        return Scales(self.mean, self.scale, _MOST_SPREADS)
+        return Scales(self.mean, 1.0 / self.scale, _MOST_SPREADS)
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return the scaled and bounded features of points (points, FEATURES)."""

@@ -19,6 +19,12 @@ from blast_env.compilation import compiled
 RELATIONS: Final = 28
 """Number of relations per solid and point."""
 
+RISING: Final = np.array((7, 12, 23, 27))
+"""Indices of the relations that change with the height of a point on a wall."""
+
+IN_PLAN: Final = np.setdiff1d(np.arange(RELATIONS), RISING)
+"""Indices of the others, which points one above the other have in common."""
+
 _LEAST_SCALED: Final = 0.05
 """Offset of scaled distances to a solid before their logarithm, m/kg^(1/3)."""
 
@@ -79,7 +85,7 @@ def put_relations(
 ) -> None:
     """Put what `solid_relations` returns into an array."""
     for point in range(len(points_m)):
-        is_above = point > 0 and _is_above(points_m, outward, point)
+        is_higher = is_above(points_m, outward, point)
         # 1. The axes of a point: ahead along the path in plan, aside to where its wall faces.
         x_m, y_m = points_m[point, 0] - start_m[0], points_m[point, 1] - start_m[1]
         way_m = sqrt(x_m * x_m + y_m * y_m) + 1e-6
@@ -103,7 +109,7 @@ def put_relations(
             straight_m = start_m[2] + there_m / way_m * (points_m[point, 2] - start_m[2])
             # 3. The relations in plan, which points one above the other have in common.
             own = found[solid, point]
-            if is_above:
+            if is_higher:
                 for number in range(RELATIONS):
                     own[number] = found[solid, point - 1, number]
             else:
@@ -138,8 +144,10 @@ def put_relations(
 
 
 @njit(error_model="numpy")
-def _is_above(points_m: FloatArray, outward: FloatArray, point: int) -> bool:
+def is_above(points_m: FloatArray, outward: FloatArray, point: int) -> bool:
     """Return whether a point differs from the one before it in height alone."""
+    if point == 0:
+        return False
     for axis in range(2):
         if (
             points_m[point, axis] != points_m[point - 1, axis]

@@ -568,6 +568,17 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     assert once.digest == again.digest
 
 
+def test_a_guess_is_what_the_networks_say_layer_by_layer() -> None:
+    """Without sums that points one above the other have in common, or messages that are kept."""
+    surrogate = by_hand(members=3)
+    samples = Samples.of(table_of_guesses(surrogate, 12), {YARD.content_hash: YARD})
+    every = np.ones(len(samples), dtype=bool)
+    both = (surrogate.impulse, samples.impulse), (surrogate.peak, samples.peak)
+    for networks, guessed in both:
+        found = predictions(surrogate, networks, samples, guessed, every)
+        assert found.log_load == pytest.approx(guessed.target, abs=1e-6)
+
+
 def test_loads_at_points_count_beside_their_mean() -> None:
     """They contradict the means here by 0.5 in the logarithm: the fit ends between both."""
     table = table_of_guesses(by_hand(), 40)
