@@ -79,8 +79,8 @@ class PlacementRules:
             dtype=np.int64,
         ).reshape(-1, 3)
         return cls(
-            *(scenario, scenario.zone, empty.catalogue, empty.costs, dearest, empty.passable),
-            variants,
+            *(scenario, scenario.zone, empty.catalogue, empty.costs.copy(), dearest),
+            *(empty.passable.copy(), variants),  # Numba would compile for read-only ones anew
         )
 
 
@@ -312,7 +312,7 @@ class Placements(NamedTuple):
         numbers = [state.catalogue.action(element) for element in state.layout]
         return cls(
             *([PlacementRules.of(state)], lambda _: state.layout),
-            *(state.legal[np.newaxis], state.occupancy[np.newaxis]),
+            *(np.array([state.legal]), state.occupancy[np.newaxis]),  # not read-only, as others
             *(left, np.array([[zone.stock, *state.catalogue.stocks]])),
             *(np.array([state.budget_left or 0.0]), np.array([zone.budget or np.nan])),
             *(np.array([numbers], dtype=np.int64), np.array([len(numbers)])),

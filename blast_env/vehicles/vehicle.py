@@ -419,5 +419,6 @@ def closing_places(
 
 
 def _along_columns(way: AccessWay, cells: BoolArray) -> BoolArray:
-    """Return the cells transposed so that the way runs along the columns, or back."""
-    return np.ascontiguousarray(cells.T if way.is_upwards else cells)
+    """Return the cells transposed so that the way runs along the columns, or back; a copy."""
+    # Never read-only, for which Numba would compile anew.
+    return np.array(cells.T if way.is_upwards else cells, order="C")

@@ -158,7 +158,7 @@ def worst_against(
         bound_m2 = (sqrt(least_m2) * (1.0 + _NEAR) + 2.0 * equal_m) ** 2
         near_m = _up_to(free_m, nearest_m2, bound_m2)
         worst = chosen_places(
-            near_m, _distances_m(walls_m, near_m), middles_m, 1, least_apart_m, equal_m
+            near_m, _distances_m(walls_m, near_m), middles_m, np.int64(1), least_apart_m, equal_m
         )[0]
         chosen_m[rank, 0], chosen_m[rank, 1] = near_m[worst, 0], near_m[worst, 1]
         distances_m[rank] = _distances_m(walls_m, near_m[worst : worst + 1]).min()
@@ -214,7 +214,7 @@ def put_worst(
     """
     for layout in range(len(layouts)):
         more_m = np.empty((counts[layout], 4))
-        after = stops = 0
+        after = stops = np.int64(0)  # a literal would be compiled for as well
         is_plain = True
         for kind in (STOPS, SOLID):
             for place in range(counts[layout]):
