@@ -24,12 +24,15 @@ from blast_env.gas import (
     ground_faces,
     set_charge,
 )
-from blast_env.layout import draw_charge
+from blast_env.layout import LayoutState, draw_charge
 from blast_env.site import Scenario
-from blast_env.surrogate import SurrogateEngine, Ways, piece_traits, solid_relations
+from blast_env.sites import SiteMeasures
+from blast_env.surrogate import SurrogateEngine, Ways, piece_traits, site_of, solid_relations
 from tests.blasts import consequences
+from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
+from tests.vehicle_sites import gate_site
 
 
 def event_engine() -> None:
@@ -60,18 +63,36 @@ def gas_in_double_precision() -> None:
 
 
 def surrogate() -> None:
-    """And a batch of environments on it."""
+    """Also of one charge and layout, and what other kernels have in themselves."""
     piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
     points = np.array([[9.0, 0.0, 1.0]])
     Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
     solid_relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
     piece_traits(np.zeros(3), 1.0, piece, piece)
-    envs = BlastBarrierVectorEnv(
-        2, scenario="control_room", engine=SurrogateEngine(), observation="features", action="place"
-    )
-    _, info = envs.reset(seed=0)
-    for _ in range(6):
-        *_, info = envs.step(info["action_mask"].argmax(axis=1))
+    site = load_scenario("control_room")
+    layout = LayoutState(site, ())
+    (first, *_) = layout.legal.ravel().nonzero()[0]
+    layout = layout.place(layout.catalogue.element(int(first)))
+    charge, engine = draw_charge(site, 0), SurrogateEngine()
+    for elements in ((), layout.layout):  # what is kept of a charge comes with the second
+        engine.loads(site, elements, charge)
+    site_of(site).approach(charge)
+
+
+def batches() -> None:
+    """Of environments: without a gate, with a way to keep open, and with a vehicle."""
+    for site in (load_scenario("control_room"), load_scenario("perimeter_gate"), gate_site()):
+        envs = BlastBarrierVectorEnv(
+            2, scenario=site, engine=SurrogateEngine(), observation="features", action="place"
+        )
+        _, info = envs.reset(seed=0)
+        for _ in range(6):
+            *_, info = envs.step(info["action_mask"].argmax(axis=1))
+
+
+def sights() -> None:
+    """As bits, which are those of a catalogue."""
+    SiteMeasures.of(yard())
 
 
 def driving() -> None:
@@ -94,16 +115,22 @@ def gas() -> None:
     response()
 
 
-def everything_else() -> None:
-    event_engine()
-    surrogate()
+def gas_and_driving() -> None:
+    gas()
     driving()
+
+
+def everything_else() -> None:
+    surrogate()
+    batches()
+    event_engine()
+    sights()
 
 
 def main() -> None:
     """Compile on two cores, in parts that share little and take about as long."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        for part in [pool.submit(gas), pool.submit(everything_else)]:
+        for part in [pool.submit(gas_and_driving), pool.submit(everything_else)]:
             part.result()
 
 
