@@ -5,6 +5,7 @@ that name a file or folder to write: these are checked before the work, and tidi
 """
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cached_property
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple, get_args, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from blast_env.errors import BlastEnvError
 from blast_env.values import is_plain_number
@@ -135,8 +136,25 @@ def note_target(context: typer.Context, target: Target) -> None:
     context.meta.setdefault(_TARGETS, []).append(target)
 
 
+_ONE_ALONE: Final = ("--charge", "--layout")
+"""Options that read as if several could be given."""
+
+
 class ShellCommand(TyperCommand):
-    """A command that turns errors of the user into messages, and checks its targets first."""
+    """A command that turns errors of the user into messages, and checks its targets first.
+
+    It refuses several charges or layouts where the last one alone would count.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of the command line."""
+        if not ctx.resilient_parsing:
+            _, _, order = self.make_parser(ctx).parse_args(args=[*args])
+            for parameter, times in Counter(order).items():
+                once = isinstance(parameter, TyperOption) and not parameter.multiple
+                if times > 1 and once and parameter.opts[0] in _ONE_ALONE:
+                    ctx.fail(f"{parameter.opts[0]} is given {times} times, must be given once.")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
