@@ -135,6 +135,12 @@ class LayoutState:
         vars(placed).update(empty_zone=self.empty_zone, occupancy=occupancy)
         return placed
 
+    def with_legal(self, elements: Iterable[Element]) -> "LayoutState":
+        """Return the placement with further elements, which are known to be legal together."""
+        placed = LayoutState(self.scenario, (*self.layout, *elements))
+        vars(placed).update(empty_zone=self.empty_zone)
+        return placed
+
     def _is_known_legal(self, element: Element) -> bool:
         """Return whether the mask has been computed and has the element."""
         legal: BoolArray | None = vars(self).get("legal")

@@ -1,25 +1,22 @@
 """Rules of thumb against vehicles: a line of posts, and a wall behind it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
-from math import ceil, floor
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.build_site import worst_places
+from blast_env.rules.lines import PostLines
 from blast_env.rules.walls import NEAR_CHARGE, ById, wall_added_to
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleSource, find_scenario
-from blast_env.units import MODULE_SIDE_M
 
 _TOLERANCE: Final = 1e-6
-"""Tolerance of lengths in modules, and of scaled distances in m / kg^(1/3)."""
+"""Tolerance of costs, and of scaled distances in m / kg^(1/3)."""
 
 
 def line_of_posts(
@@ -87,11 +84,11 @@ def _line_on(very: ById) -> LayoutState:
     # Branch and bound over lines and items: (1) close the line with the fewest posts; (2) bound its
     # distance from above, as if ratings held at any speed, which takes no search for speeds; (3)
     # only if that beats the best so far, the true distance; (4) drop posts without effect.
-    vehicles = _Vehicles(scenario)
-    best = LayoutState.empty(scenario)
+    vehicles, lines = _Vehicles(scenario), PostLines(LayoutState.empty(scenario))
+    best = lines.empty
     farthest = vehicles.farthest(best)
-    for item, line in product(vehicles.items(), vehicles.lines()):
-        placement = vehicles.with_posts(line, item)
+    for item, line in product(lines.items, lines.with_gaps):
+        placement = lines.closed_by(item, line)
         if placement is None:
             continue
         cheaper = placement.cost < best.cost - _TOLERANCE
@@ -104,20 +101,9 @@ def _line_on(very: ById) -> LayoutState:
     return vehicles.without_idle_posts(best)
 
 
-Line = tuple[tuple[Cell, ...], ...]
-"""Straight runs of squares in the build zone's grid, continued beyond the zone."""
-
-
-class _Post(NamedTuple):
-    """A post along a run: the number of its variant, and its length in modules."""
-
-    variant: int
-    length: int
-
-
 @dataclass(frozen=True)
 class _Vehicles:
-    """All vehicles of a scenario together, and the squares of its build zone's grid."""
+    """All vehicles of a scenario together."""
 
     scenario: Scenario
 
@@ -140,142 +126,17 @@ class _Vehicles:
         return min(self.scaled_m(self.scenario, source, placement.layout) for source in sources)
 
     @cached_property
-    def _empty(self) -> LayoutState:
-        """The empty placement."""
-        return LayoutState.empty(self.scenario)
-
-    @cached_property
     def _without_speed(self) -> tuple[VehicleSource, ...]:
         return tuple(
             source if source.motion is None else source.model_copy(update={"motion": None})
             for source in self.scenario.vehicles
         )
 
-    @cached_property
-    def span(self) -> tuple[range, range]:
-        """Rows and columns of the grid, continued to the border of the site."""
-        zone, site = self.scenario.zone, self.scenario.site
-        (left, bottom), side = zone.corner_m, MODULE_SIDE_M
-        rows = range(-floor(bottom / side), ceil((site.height_m - bottom) / side - _TOLERANCE))
-        columns = range(-floor(left / side), ceil((site.width_m - left) / side - _TOLERANCE))
-        return rows, columns
-
-    @cached_property
-    def closed(self) -> BoolArray:
-        """Mask of the squares of the span that are closed to every vehicle (rows, columns)."""
-        rows, columns = self.span
-        closed = np.ones((len(rows), len(columns)), dtype=bool)
-        for source in self.scenario.vehicles:
-            own = np.zeros_like(closed)
-            for rectangle in self.scenario.vehicle_ground(source).closed_m:
-                own[self._squares(rectangle)] = True
-            # Closed to every vehicle: a line must stop the one that it stops least.
-            closed &= own
-        return closed
-
-    def lines(self) -> Iterator[Line]:
-        """Yield straight lines, then rings from the innermost outwards."""
-        rows, columns = self.span
-        zone = self.scenario.zone
-        for row in range(zone.rows):
-            yield (tuple((row, column) for column in columns),)
-        for column in range(zone.columns):
-            yield (tuple((row, column) for row in rows),)
-        protected = [
-            structure.rectangle_m for structure in self.scenario.structures if structure.protected
-        ]
-        around = Rectangle.around(protected)
-        for steps in range(max(len(rows), len(columns))):
-            yield self._ring(around.grown(steps * MODULE_SIDE_M))
-
-    def items(self) -> list[int]:
-        """Return the indices of the items that stop vehicles, or that of the single module."""
-        variants = self._empty.catalogue.variants
-        return sorted({variant.item for variant in variants if variant.stops_vehicles})
-
-    def with_posts(self, line: Line, item: int) -> LayoutState | None:
-        """Return the placement of the fewest posts that close a line, or `None` if none do."""
-        placement = self._empty
-        for run in line:
-            post = self._along(item, run)
-            end = 0  # of the closed part of the run
-            for index in self._closed_along(run, placement):
-                # Greedy from one end, as far apart as the narrowest vehicle allows, which needs the
-                # fewest posts; where the farthest place is not legal, the next nearer one.
-                while index - end >= self.width - _TOLERANCE:
-                    latest = min(ceil(end + self.width - _TOLERANCE) - 1, index - post.length)
-                    tried = range(latest, end - 1, -1)
-                    may = (at for at in tried if self._is_legal(post, placement, run[at]))
-                    at = next(may, None)
-                    if at is None:
-                        return None
-                    element = placement.catalogue.element_at(post.variant, *run[at])
-                    placement = placement.place(element)
-                    end = at + post.length
-                end = index + 1
-        return placement
-
     def without_idle_posts(self, placement: LayoutState) -> LayoutState:
         """Return the placement without posts that do not increase the least scaled distance."""
-        farthest = self.farthest(placement)
+        farthest, empty = self.farthest(placement), LayoutState.empty(self.scenario)
         for post in placement.layout:
-            fewer = tuple(element for element in placement.layout if element != post)
-            without = LayoutState.of(self.scenario, fewer)
+            without = empty.with_legal(other for other in placement.layout if other != post)
             if self.farthest(without) > farthest - _TOLERANCE:
                 placement = without
         return placement
-
-    @cached_property
-    def width(self) -> float:
-        """Width of the narrowest vehicle in modules."""
-        return min(vehicle.width_m for vehicle in self.scenario.vehicles) / MODULE_SIDE_M
-
-    def _along(self, item: int, run: tuple[Cell, ...]) -> "_Post":
-        """Return the variant of an item with the largest length along a run."""
-        is_row = run[0][0] == run[-1][0]
-        variants = self._empty.catalogue.variants
-        posts = [
-            _Post(number, variant.columns if is_row else variant.rows)
-            for number, variant in enumerate(variants)
-            if variant.item == item
-        ]
-        return max(posts, key=lambda post: post.length)
-
-    def _is_legal(self, post: _Post, placement: LayoutState, cell: Cell) -> bool:
-        """Return whether a post may be placed with its first module on a cell."""
-        on_empty = self.scenario.zone.has(cell) and self._empty.legal[post.variant, *cell]
-        if not on_empty:  # then neither on any other placement
-            return False
-        # A single check, which on a large zone is a thousand times faster than the whole mask.
-        return placement.explain(placement.catalogue.element_at(post.variant, *cell)) is None
-
-    def _closed_along(self, run: tuple[Cell, ...], placement: LayoutState) -> list[int]:
-        """Return the indices of a run's squares closed to every vehicle, and the run's length."""
-        rows, columns = self.span
-        row, column = np.transpose(run)
-        closed = self.closed[row - rows.start, column - columns.start]
-        if placement.layout:  # posts of another run, which may cross this one
-            closed |= [cell in placement.cells for cell in run]
-        return [*np.flatnonzero(closed).tolist(), len(run)]
-
-    def _ring(self, inner_m: Rectangle) -> Line:
-        """Return the runs of squares directly outside a rectangle, within the span."""
-        rows, columns = self.span
-        vertical, horizontal = self._squares(inner_m)
-        low, high = vertical.start + rows.start - 1, vertical.stop + rows.start
-        left, right = horizontal.start + columns.start - 1, horizontal.stop + columns.start
-        up = [row for row in range(low, high + 1) if row in rows]
-        across = [column for column in range(left, right + 1) if column in columns]
-        runs = [tuple((row, column) for row in up) for column in (left, right) if column in columns]
-        runs += [tuple((row, column) for column in across) for row in (low, high) if row in rows]
-        return tuple(runs)
-
-    def _squares(self, rectangle_m: Rectangle) -> tuple[slice, slice]:
-        """Return the squares of the span that a rectangle overlaps."""
-        (left, bottom), side = self.scenario.zone.corner_m, MODULE_SIDE_M
-        rows, columns = self.span
-        low = floor((rectangle_m.bottom - bottom) / side + _TOLERANCE) - rows.start
-        high = ceil((rectangle_m.top - bottom) / side - _TOLERANCE) - rows.start
-        first = floor((rectangle_m.left - left) / side + _TOLERANCE) - columns.start
-        last = ceil((rectangle_m.right - left) / side - _TOLERANCE) - columns.start
-        return slice(max(low, 0), max(high, 0)), slice(max(first, 0), max(last, 0))
