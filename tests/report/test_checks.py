@@ -1,14 +1,29 @@
 """The checks by hand of a report add up."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from blast_env.answers import Line
-from blast_env.answers.report import Report, StudyOptions, report_document, run_report
+from blast_env.answers.report import Report, Study, StudyOptions, report_document, run_report
 from blast_env.curves import kingery_bulmash
+from blast_env.evaluation.record import BlastRecord
 from blast_env.site import Charge, Scenario
 from tests.gas_sites import WALL, site_document
+from tests.report.test_report import changed
+
+
+def check_sum(impulse: list[str]) -> None:
+    """Repeat the sum of an impulse, and compare it with the table of bays."""
+    means, step, total = re.match(  # type: ignore[union-attr]
+        r"\((.*)\) kPa x (.*) ms = (.*) Pa s", impulse[1]
+    ).groups()
+    assert float(step) > 0.0
+    assert sum(map(float, means.split(" + "))) * float(step) == pytest.approx(
+        float(total), rel=0.01
+    )
+    assert impulse[2].endswith(f"{total} Pa s")
 
 
 def test_a_reviewer_who_repeats_the_checks_finds_the_same(report: Report) -> None:
@@ -26,15 +41,26 @@ def test_a_reviewer_who_repeats_the_checks_finds_the_same(report: Report) -> Non
     assert f"{away_m:.2f} m" in stand_off[0]
     expected = kingery_bulmash("reflected_impulse", away_m, 5.0)
     assert f"{expected:,.0f} Pa s" in stand_off[2]
-    means, step, total = re.match(  # type: ignore[union-attr]
-        r"\((.*)\) kPa x (.*) ms = (.*) Pa s", impulse[1]
-    ).groups()
-    assert sum(map(float, means.split(" + "))) * float(step) == pytest.approx(
-        float(total), rel=0.01
-    )
-    assert impulse[2].endswith(f"{total} Pa s")
+    check_sum(impulse)
     assert "factor 4" in pane[1]
     assert cost[-1] == "sum 4; cost of the layout 4"
+
+
+def test_the_sum_of_an_impulse_ends_at_its_largest_value_before_a_long_suction(
+    study: Study,
+) -> None:
+    """The running integral is below 0 at the end, so that its values do not rise."""
+
+    def sucked(_: str, __: float, record: BlastRecord) -> BlastRecord:
+        pressure = record.pressure_pa.copy()
+        count = pressure.shape[1]
+        pressure[:, count // 3 :] = -pressure.max()
+        return replace(record, pressure_pa=pressure)
+
+    document = report_document(Report(changed(study, sucked)))
+    texts = [part.text() for part in document.parts if isinstance(part, Line)]
+    begin = next(k for k, text in enumerate(texts) if text.startswith("Impulse of a bay"))
+    check_sum(texts[begin + 1 : begin + 4])
 
 
 def test_the_stand_off_is_that_of_a_building_with_a_load() -> None:

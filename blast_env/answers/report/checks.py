@@ -95,7 +95,7 @@ def _sum(facade: FacadeResponse) -> tuple[str, ...]:
     index = int(net_pa_s.max(axis=1).argmax())
     own, time_s = net_pa_s[index], facade.time_s
     last = int(own.argmax())
-    first = int(np.searchsorted(own, 1e-5 * own[last]))
+    first = int(np.argmax(own >= 1e-5 * own[last]))  # suction may follow: it is not sorted
     ends_s = np.linspace(time_s[max(first - 1, 0)], time_s[last], _INTERVALS + 1)
     parts_pa_s = np.diff(np.interp(ends_s, time_s, own))
     step_s = float(ends_s[1] - ends_s[0])
