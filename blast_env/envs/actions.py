@@ -574,7 +574,8 @@ class Suggestions:
     @cached_property
     def proposals(self) -> "Proposals":
         """What the rules propose."""
-        from blast_env.rules import ById, proposals_for  # as in `of`
+        from blast_env.layout import ById
+        from blast_env.rules import proposals_for  # as in `of`
 
         return proposals_for(ById(self.scenario), self.rules, self.charge)
 

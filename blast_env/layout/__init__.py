@@ -16,6 +16,7 @@ from blast_env.lazy import on_first_use
 if TYPE_CHECKING:
     from blast_env.layout.files import LayoutFile, load_layout, write_layout
     from blast_env.layout.placement import (
+        ById,
         LayoutState,
         check_layout,
         kept_clear,
@@ -26,6 +27,7 @@ else:
     __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
+    "ById",
     "LayoutFile",
     "LayoutState",
     "build_site",

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import fsum
 from typing import TYPE_CHECKING, Any, Self
 
@@ -29,6 +29,19 @@ from blast_env.vehicles.vehicle import closing_places, is_open
 
 if TYPE_CHECKING:  # most sites have no vehicle
     from blast_env.vehicles.worst_places import WorstPlaces
+
+
+@dataclass(frozen=True, eq=False)
+class ById:
+    """A scenario as a cache key, compared by identity, because comparison by value is slow."""
+
+    scenario: Scenario
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ById) and other.scenario is self.scenario
+
+    def __hash__(self) -> int:
+        return id(self.scenario)
 
 
 class LegalLayout(tuple[Element, ...]):
@@ -88,7 +101,7 @@ class LayoutState:
         Args:
             scenario: The scenario, or its bundled name or path.
         """
-        return cls(find_scenario(scenario), ())
+        return _empty_of(ById(find_scenario(scenario)))
 
     @classmethod
     def of(cls, scenario: AnyScenario, layout: Sequence[Element]) -> "LayoutState":
@@ -133,6 +146,8 @@ class LayoutState:
         occupancy = self.occupancy.copy()
         self._stand(occupancy, element)
         vars(placed).update(empty_zone=self.empty_zone, occupancy=occupancy)
+        if "_room" in vars(self):
+            vars(placed)["_room"] = self._room_beside(element)
         return placed
 
     def with_legal(self, elements: Iterable[Element]) -> "LayoutState":
@@ -194,16 +209,34 @@ class LayoutState:
         (1, 0, 0) without a build zone.
         """
         # 1. Free and usable ground; 2. the budget; 3. the stock; 4. the access way.
-        cells, item_of = self.empty_zone, [variant.item for variant in self.catalogue.variants]
-        legal = cells.places(cells.usable & (self.occupancy == 0))
+        item_of = [variant.item for variant in self.catalogue.variants]
+        legal = self._room.copy()
         if self._zone.budget is not None:
-            legal &= cells.costs <= self._spendable
+            legal &= self.costs <= self._spendable
         in_stock = np.array(self.stocks_left)[item_of] > 0
         legal &= in_stock[:, np.newaxis, np.newaxis]
         if self._zone.access_way is not None:
             legal &= ~self._closing
         legal.flags.writeable = False
         return legal
+
+    @cached_property
+    def _room(self) -> BoolArray:
+        """Whether each variant has free and usable ground at each lower left cell."""
+        return self.empty_zone.places(self.empty_zone.usable & ~self._taken)
+
+    def _room_beside(self, element: Element) -> BoolArray:
+        """Return the room that a further element leaves."""
+        room, (row, column) = self._room.copy(), element[:2]
+        own = self.catalogue.variant(element)
+        if own.is_measure:  # it covers no cell
+            return room
+        for left, variant in zip(room, self.catalogue.variants, strict=True):
+            if not variant.is_measure:
+                # The lower left cells from which it would reach the element.
+                low, first = max(row - variant.rows + 1, 0), max(column - variant.columns + 1, 0)
+                left[low : row + own.rows, first : column + own.columns] = False
+        return room
 
     @cached_property
     def occupancy(self) -> NDArray[np.uint8]:
@@ -457,6 +490,12 @@ class LayoutState:
     def __reduce__(self) -> tuple[Callable[..., "LayoutState"], tuple[Any, ...]]:
         """Pickle scenario and layout alone: cached arrays would come back writeable."""
         return LayoutState, (self.scenario, self.layout)
+
+
+@lru_cache(maxsize=16)
+def _empty_of(site: ById) -> LayoutState:
+    """Return the empty placement; one for all callers, so that its mask is computed once."""
+    return LayoutState(site.scenario, ())
 
 
 def _placed_one_by_one(empty: LayoutState, layout: Layout) -> LayoutState:

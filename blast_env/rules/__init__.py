@@ -6,7 +6,6 @@ from blast_env.rules.table import RULES, Need, Rule, RuleRow, layouts_by_rule
 from blast_env.rules.walls import (
     NEAR_BUILDING,
     NEAR_CHARGE,
-    ById,
     expected_charge,
     hardening_alone,
     hardening_and_sight_lines,
@@ -24,7 +23,6 @@ __all__ = [
     "NEAR_BUILDING",
     "NEAR_CHARGE",
     "RULES",
-    "ById",
     "Need",
     "Proposals",
     "Rule",

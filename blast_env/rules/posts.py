@@ -9,10 +9,10 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.layout import LayoutState
+from blast_env.layout import ById, LayoutState
 from blast_env.layout.build_site import worst_places
 from blast_env.rules.lines import PostLines
-from blast_env.rules.walls import NEAR_CHARGE, ById, wall_added_to
+from blast_env.rules.walls import NEAR_CHARGE, wall_added_to
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleSource, find_scenario
 
 _TOLERANCE: Final = 1e-6

@@ -9,9 +9,9 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.layout import LayoutState
+from blast_env.layout import ById, LayoutState
 from blast_env.rules.table import RuleRow
-from blast_env.rules.walls import ById, expected_charge, line_of_sight, seen_with
+from blast_env.rules.walls import expected_charge, line_of_sight, seen_with
 from blast_env.sections import PointM
 from blast_env.site import AnyCharge, Scenario
 from blast_env.sites import Visibility, cut_share_of

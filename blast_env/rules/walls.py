@@ -17,7 +17,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Measure, Rectangle
-from blast_env.layout import LayoutState
+from blast_env.layout import ById, LayoutState
 from blast_env.sections import PointM
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, VehicleSource, find_scenario
 from blast_env.site.blast_site import Charge
@@ -43,19 +43,6 @@ _TOLERANCE_M: Final = 1e-9
 
 WallKind = Literal["high", "long"]
 """Preferred items of a wall of pieces: the highest, or the longest for their cost."""
-
-
-@dataclass(frozen=True, eq=False)
-class ById:
-    """A scenario as a cache key, compared by identity, because comparison by value is slow."""
-
-    scenario: Scenario
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ById) and other.scenario is self.scenario
-
-    def __hash__(self) -> int:
-        return id(self.scenario)
 
 
 def line_of_sight_wall(
@@ -103,7 +90,7 @@ def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
     """Return the reason why `line_of_sight_wall` has no place; empty if it has one."""
     placement = LayoutState.empty(scenario)
     place_m = _place_m(placement, charge)
-    if _View.of(placement, place_m).between.any():
+    if (placement.legal & _view_of(ById(placement.scenario), place_m).lies_between).any():
         return ""
     x_m, y_m = place_m
     several = charge is None and len(placement.scenario.charge) > 1
@@ -158,18 +145,20 @@ def wall_added_to(
     # (1) The preferred variants with a place between charge and structures; (2) the depth of the
     # wall by the first of them; (3) both ends grow, the one nearer to the line of sight first; (4)
     # the next variant goes on where the stock of one is used up.
-    view = _View.of(placement, charge_m)
+    view = _view_of(ById(placement.scenario), charge_m)
+    between = placement.legal & view.lies_between
     variants = _preferred(placement, view.lies_along, kind)
-    variants = [number for number in variants if view.between[number].any()]
+    variants = [number for number in variants if between[number].any()]
     if not variants:
         return placement
-    wall_m = view.wall_depth_m(variants[0], share)
+    wall_m = view.wall_depth_m(variants[0], between[variants[0]], share)
     ends = {1.0: _End(side=1.0), -1.0: _End(side=-1.0)}
     for number in variants:
         growing = list(ends)
         while growing and not placement.is_full:
             end = ends[min(growing, key=lambda side: ends[side].reach_m)]
-            place = view.next_place(number, placement.legal[number], wall_m, end)
+            possible = placement.legal[number] & view.lies_between[number]
+            place = view.next_place(number, possible, wall_m, end)
             if place is None:
                 growing.remove(end.side)
                 continue
@@ -378,26 +367,28 @@ class _View:
             columns).
         half_width_m: Half width of each variant across the line (variants,).
         lies_along: Mask of the variants at least as long across the line as along it (variants,).
-        between: Mask of the legal pieces between charge and structures (variants, rows, columns).
+        lies_between: Mask of the pieces on usable cells between charge and structures (variants,
+            rows, columns).
     """
 
     depth_m: FloatArray
     aside_m: FloatArray
     half_width_m: FloatArray
     lies_along: BoolArray
-    between: BoolArray
+    lies_between: BoolArray
 
     @classmethod
-    def of(cls, placement: LayoutState, charge_m: PointM) -> "_View":
-        scenario = placement.scenario
+    def of(cls, scenario: Scenario, charge_m: PointM) -> "_View":
+        """Return the view from a charge."""
+        empty = LayoutState.empty(scenario)
         x_m, y_m = scenario.zone.centres_m
         # Coordinates along the line of sight (depth) and across it (aside), of the centres of
         # cells, then of pieces by the offset from their lower left cell.
         along_x, along_y, _ = line_of_sight(scenario, charge_m)
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
-        between = placement.usable & _between(scenario, charge_m)
+        between = empty.usable & _between(scenario, charge_m)
         aside_m = (y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y
-        variants = placement.catalogue.variants
+        variants = empty.catalogue.variants
         up_m, right_m = _centres_off_m(variants)
         across_x, across_y = abs(along_y), abs(along_x)
         columns_m = MODULE_SIDE_M / 2.0 * np.array([variant.columns for variant in variants])
@@ -409,46 +400,55 @@ class _View:
             aside_m=aside_m + (up_m * along_x - right_m * along_y),
             half_width_m=half_width_m,
             lies_along=half_width_m >= columns_m * across_y + rows_m * across_x - _TOLERANCE_M,
-            between=placement.legal & placement.places(between),
+            lies_between=empty.places(between),
         )
 
-    def wall_depth_m(self, number: int, share: float) -> float:
-        """Return the depth of a wall of a variant, at a share of the available depths."""
+    def wall_depth_m(self, number: int, possible: BoolArray, share: float) -> float:
+        """Return the depth of a wall of a variant, at a share of the available depths.
+
+        Args:
+            number: Index of the variant.
+            possible: Mask of its legal places between charge and structures (rows, columns).
+            share: The share.
+        """
         # Depths at which a piece can stand on the line of sight, or as near to it as possible.
-        from_line_m = np.where(self.between[number], np.abs(self.aside_m[number]), np.inf)
+        from_line_m = np.where(possible, np.abs(self.aside_m[number]), np.inf)
         on_line = from_line_m <= from_line_m.min() + MODULE_SIDE_M / 2.0
         depths_m = self.depth_m[number][on_line]
         near_m, far_m = float(depths_m.min()), float(depths_m.max())
         return near_m + share * (far_m - near_m)
 
-    def next_place(self, number: int, legal: BoolArray, wall_m: float, end: _End) -> Place | None:
+    def next_place(
+        self, number: int, possible: BoolArray, wall_m: float, end: _End
+    ) -> Place | None:
         """Return the next place of a variant in a wall, or `None` if there is none.
 
         Args:
             number: Index of the variant.
-            legal: Mask of its legal places (rows, columns).
+            possible: Mask of its legal places between charge and structures (rows, columns).
             wall_m: Depth of the wall.
         """
-        aside_m, half_width_m = self.aside_m[number], float(self.half_width_m[number])
-        start_m = end.side * aside_m - half_width_m
-        gain_m = end.side * aside_m + half_width_m - end.reach_m
-        # Rounded, so that values that differ only by rounding are equal.
-        off_m = np.abs(self.depth_m[number] - wall_m).round(9)
-        gap_m = np.abs(start_m - end.reach_m).round(9)
-        # A piece must lengthen the wall by half a module, and may step off the axis by as much as
-        # it lengthens it and half a module: a bend of about 60 degrees at most.
-        wider = gain_m >= _LEAST_GAIN_M
+        # 1. What each place adds to the wall. Rounded, so that values that differ only by rounding
+        #    are equal.
+        places, half_width_m = np.flatnonzero(possible), float(self.half_width_m[number])
+        aside_m = end.side * self.aside_m[number].ravel()[places]
+        start_m, gain_m = aside_m - half_width_m, aside_m + half_width_m - end.reach_m
+        off_m = np.abs(self.depth_m[number].ravel()[places] - wall_m).round(9)
+        # 2. A piece must lengthen the wall by half a module, and may step off the axis by as much
+        #    as it lengthens it and half a module: a bend of about 60 degrees at most.
         steep = off_m > end.off_m + gain_m + _LEAST_GAIN_M
-        possible = legal & self.between[number] & wider & ~steep
-        if not possible.any():
+        wide = np.flatnonzero((gain_m >= _LEAST_GAIN_M) & ~steep)
+        if not len(wide):
             return None
-        # Without a gap if possible; else a slightly wider gap, if that is nearer to the axis.
-        latest_m = end.reach_m + _TOLERANCE_M
-        if not (possible & (start_m <= latest_m)).any():
-            latest_m = float(start_m[possible].min()) + MODULE_SIDE_M
-        near = np.argwhere(possible & (start_m <= latest_m))
-        cells = ((int(row), int(column)) for row, column in near)
-        return number, *min(cells, key=lambda cell: (off_m[cell], gap_m[cell], cell))
+        # 3. Without a gap if possible; else a slightly wider gap, if that is nearer to the axis.
+        latest_m, first_m = end.reach_m + _TOLERANCE_M, float(start_m[wide].min())
+        if first_m > latest_m:
+            latest_m = first_m + MODULE_SIDE_M
+        near = wide[start_m[wide] <= latest_m]
+        gap_m = np.abs(start_m[near] - end.reach_m).round(9)
+        nearest = near[np.lexsort((gap_m, off_m[near]))[0]]  # of equal ones the first cell
+        row, column = divmod(int(places[nearest]), possible.shape[1])
+        return number, row, column
 
     def end_with(self, place: Place, wall_m: float, end: _End) -> _End:
         """Return an end of a wall at a depth after the addition of a piece."""
@@ -456,6 +456,12 @@ class _View:
         if reach_m <= end.reach_m:  # the piece is at the other end
             return end
         return _End(end.side, reach_m, abs(float(self.depth_m[place]) - wall_m))
+
+
+@lru_cache(maxsize=4)
+def _view_of(site: ById, charge_m: PointM) -> _View:
+    """Return the view from a charge, cached for the rules that need it."""
+    return _View.of(site.scenario, charge_m)
 
 
 def line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, float]:

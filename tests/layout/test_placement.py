@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
 from blast_env.layout import LayoutState, check_layout, usable_cells
+from blast_env.rules import random_element
 from tests.site.documents import Document
 from tests.site.zones import (
     area,
@@ -74,6 +75,15 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
     fewer = LayoutState.of(scenario, some)
     assert all(fewer.free[cell] for cell in set(full.cells) - set(some))
     assert (fewer.free >= full.free).all()
+
+
+@pytest.mark.parametrize("name", ["car_park", "hotel_forecourt", "school_wing", "perimeter_gate"])
+def test_the_legal_places_are_those_of_the_same_layout_at_once(name: str) -> None:
+    rng, placement = np.random.default_rng(0), LayoutState.empty(name)
+    while not placement.is_full:
+        placement = placement.place(random_element(placement, rng))
+        at_once = LayoutState(placement.scenario, placement.layout)
+        assert (placement.legal == at_once.legal).all(), placement.layout
 
 
 # --- Whole layouts.
