@@ -315,12 +315,18 @@ def height_words(height_m: float) -> str:
 def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
     """Yield that some of the fixed charges of a site are not among those of an answer.
 
-    Nothing is said of charges at other places, which the user gave.
+    Nothing is said of charges at other places or of other masses, which the user gave.
     """
-    counted = [charge for charge in charges if isinstance(charge, Charge)]
-    places = {(charge.position_m, charge.height_m) for charge in counted}
+    counted = {charge for charge in charges if isinstance(charge, Charge)}
     fixed = fixed_charges(scenario)
-    left_out = [charge for charge in fixed if (charge.position_m, charge.height_m) not in places]
+    places = {charge._replace(tnt_kg=0.0) for charge in counted}
+    with_own_mass = {charge._replace(tnt_kg=0.0) for charge in counted & {*fixed}}
+    left_out = []
+    for charge in fixed:
+        place = charge._replace(tnt_kg=0.0)
+        # Of several at one place, those that count have their own masses.
+        if charge not in counted and (place not in places or place in with_own_mass):
+            left_out.append(charge)
     if 0 < len(left_out) < len(fixed):
         yield f"not among these: {len(left_out)} of the {len(fixed)} fixed charges of the site"
 

@@ -6,13 +6,24 @@ from functools import partial
 from typing import Final
 
 from blast_env.answers.assess import cells_words
-from blast_env.answers.document import AnyCell, AnyPart, Line, Number, Table, interval
+from blast_env.answers.document import (
+    AnyCell,
+    AnyPart,
+    Line,
+    Number,
+    Table,
+    charge_text,
+    interval,
+    left_out_words,
+    lines,
+)
 from blast_env.design.by_atlas import WORSE
 from blast_env.design.search import DesignProblem, SearchResult
 from blast_env.evaluation import Evaluation
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
+from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ConditionalValueAtRisk, WorstRisk
 from blast_env.statistics import reductions
 
@@ -62,8 +73,13 @@ def search_answer(run: SearchRun, checked: Evaluation | None) -> Iterator[AnyPar
     if checked is None:
         yield Line.of(
             "no threat is held out: with this engine a charge is one blast, and the search used "
-            "every charge; `evaluate` takes other charges"
+            "all that were drawn; `evaluate` takes other charges"
         )
+    charges = [threat.charge for threat in problem.threats]
+    if len({*charges}) == 1 and isinstance(charges[0], Charge):
+        yield Line.of(f"the charge of the search: {charge_text(charges[0])}")
+    left_out = left_out_words(problem.scenario, charges)
+    yield from lines((f"note: {words}" for words in left_out), "flag")
     if result.by and not result.layout:
         yield Line.of(f"nothing is placed: {result.by}")
     if result.by == WORSE:

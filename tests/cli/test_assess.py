@@ -124,12 +124,13 @@ def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
 def test_a_verdict_names_how_many_fixed_charges_it_leaves_out(tmp_path: Path) -> None:
     document = glazed_hut().model_dump(mode="json", exclude_none=True)
     (first,) = document["charge"]
-    document["charge"] = [first, first | {"tnt_kg": 1.0, "height_m": 1.0}]
+    document["charge"] = [first, first | {"tnt_kg": 1.0}]
     site = tmp_path / "two.toml"
     blast_env.save_scenario(Scenario.from_document(document, "two"), site)
-    outputs = [run(site, "--cell", "0.5", "--charges", count) for count in ("1", "2")]
+    asked = (("--charges", "1"), ("--charges", "2"), ("--tnt-kg", "3"))
+    outputs = [run(site, "--cells", "coarse", *options) for options in asked]
     said = "flag: not among these: 1 of the 2 fixed charges of the site"
-    assert [said in output for output in outputs] == [True, False]
+    assert [said in output for output in outputs] == [True, False, False]
 
 
 def test_a_verdict_names_the_protected_buildings_that_it_does_not_cover(tmp_path: Path) -> None:

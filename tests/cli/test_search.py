@@ -87,6 +87,7 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "1 of 1 blasts spent" in result.stdout
     assert "no threat is held out: with this engine a charge is one blast" in result.stdout
+    assert "the charge of the search: 1 kg at (" in result.stdout
     assert "held out " not in result.stdout.replace("is held out", "")
     found, provenance = packaged_surrogate(), LayoutFile.load(out / "layout.json").provenance
     assert provenance["options"]["surrogate"] == found.digest
