@@ -221,13 +221,11 @@ def _cut(
     beside = (to_y * along_x)[:, :, np.newaxis] - (to_x * along_y)[:, np.newaxis, :]
     # The shadow of a square across a line is its side times |cos| + |sin|, half to either side.
     half_width = MODULE_SIDE_M / 2.0 * np.abs(direction).sum(axis=1)
-    cut: BoolArray = (
-        (np.abs(beside) < half_width[:, np.newaxis, np.newaxis])
-        & (along > 0.0)
-        & (along < length_m[:, np.newaxis, np.newaxis])
-    )
-    share: FloatArray = np.clip(along / length_m[:, np.newaxis, np.newaxis], 0.0, 1.0)
-    return cut, share
+    cut: BoolArray = np.abs(beside, out=beside) < half_width[:, np.newaxis, np.newaxis]
+    cut &= along > 0.0
+    cut &= along < length_m[:, np.newaxis, np.newaxis]
+    along /= length_m[:, np.newaxis, np.newaxis]  # from here on a share of the length
+    return cut, np.clip(along, 0.0, 1.0, out=along)
 
 
 @dataclass(frozen=True)
@@ -370,8 +368,7 @@ class _SummedGains:
     def __init__(self, placement: LayoutState, lines: Visibility) -> None:
         self._weight, self._left = lines.weight, np.ones(len(lines.weight), dtype=bool)
         self._possible = placement.legal.reshape(-1)  # what is not legal never becomes so
-        by_variants = _cut_by_variants(lines, placement.catalogue)
-        self._cut = by_variants.compress(self._possible, axis=1)  # line by line, as sums take it
+        self._cut = _cut_by_legal(lines, placement)  # line by line, as sums take it
         self._column = np.cumsum(self._possible) - 1
         self._gain = np.zeros(len(self._possible))
         self._gain[self._possible] = _gains(lines.weight, self._cut)
@@ -419,26 +416,28 @@ def _gains(weight: FloatArray, cut: BoolArray) -> FloatArray:
     return gains
 
 
-def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
-    """Return whether each action would cut each line (lines, actions).
-
-    A piece that reaches beyond the zone counts with its part inside.
-    """
-    cut = np.zeros((len(lines.weight), len(catalogue.variants), *catalogue.shape), dtype=bool)
-    by_height = {
-        height_m: lines.cut_by(height_m)
-        for height_m in {
-            variant.height_m for variant in catalogue.variants if not variant.is_measure
-        }
-    }
-    for number, variant in enumerate(catalogue.variants):
-        if variant.is_measure:
+def _cut_by_legal(lines: Visibility, placement: LayoutState) -> BoolArray:
+    """Return whether each legal action would cut each line (lines, legal actions)."""
+    catalogue, legal = placement.catalogue, placement.legal.reshape(len(placement.legal), -1)
+    count, ends = len(lines.weight), np.cumsum(legal.sum(axis=1))
+    found = np.zeros((count, ends[-1]), dtype=bool)
+    by_height: dict[float | None, BoolArray] = {}
+    by_size: dict[tuple[float | None, int, int], BoolArray] = {}
+    for variant, own, end in zip(catalogue.variants, legal, ends.tolist(), strict=True):
+        if variant.is_measure or not own.any():
             continue
-        own = cut[:, number]
-        own[...] = by_height[variant.height_m]
-        for cells, length in ((own.transpose(1, 0, 2), variant.rows), (own.T, variant.columns)):
-            take_next(cells, 0, length)
-    return cut.reshape(len(lines.weight), catalogue.finish)
+        height_m, size = variant.height_m, (variant.height_m, variant.rows, variant.columns)
+        if height_m not in by_height:
+            by_height[height_m] = lines.cut_by(height_m)
+        if size not in by_size:
+            # As if the cells of all lines were in one row. What reaches beyond a side of the zone
+            # meets other cells there, but no such piece is legal.
+            cut = by_height[height_m].copy()
+            take_next(cut.reshape(-1, catalogue.shape[1]), 0, variant.rows)
+            take_next(cut.reshape(-1), 0, variant.columns)
+            by_size[size] = cut.reshape(count, own.size)
+        found[:, end - own.sum() : end] = by_size[size].compress(own, axis=1)
+    return found
 
 
 def _wall_share(scenario: Scenario, sight: _Sight) -> float:
