@@ -56,7 +56,18 @@ from studies.site_names import held_out_names, scenario_of, site_names
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_site_blasts.parquet")
-    for name in ("front", "close", "many", "kerb", "street", "liked", "module", "further", "later")
+    for name in (
+        "front",
+        "close",
+        "many",
+        "kerb",
+        "street",
+        "liked",
+        "module",
+        "further",
+        "later",
+        "strong",
+    )
 )
 """Data of the packaged surrogate: blasts on generated sites."""
 
@@ -199,7 +210,7 @@ def fit_it(
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes over all blasts.")] = 40,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over all blasts.")] = 30,
     every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = EVERY,
     seed: int = 0,
     device: Annotated[str, typer.Option(help="Device of torch.")] = "cpu",

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import starmap
 from math import ceil
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
@@ -16,8 +16,10 @@ from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.surrogate.approach import FEATURES, INPUTS
 from blast_env.surrogate.layers import SingleArray
+from blast_env.surrogate.loads import MOST_OVER
 from blast_env.surrogate.network import (
     MESSAGE,
+    MOST_SPREADS,
     SHAPES,
     AnyFloats,
     Fit,
@@ -99,7 +101,7 @@ def fit(
     # 2. Several networks for each kind of load, from different initial weights: an ensemble, whose
     # spread tells where it does not know (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017).
     tasks = [
-        (_Stack(members, seed).to(device), _Target.of(loads, device), seed)
+        (_Stack(members, seed).to(device), _Target.of(loads, samples.counts, device), seed)
         for loads in (samples.impulse, samples.peak)[: 1 + peaks]
     ]
     # 3. Both kinds at once, since torch leaves the interpreter to others while it multiplies.
@@ -326,12 +328,12 @@ def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """`Loads` as tensors.
+    """`Loads` as tensors, bounded by what networks may say.
 
     Attributes:
         known: As in `Loads`.
-        target: As in `Loads`.
-        at_points: As in `Loads`.
+        target: As in `Loads`, bounded.
+        at_points: As in `Loads`, bounded.
         power: As in `Loads`.
         is_known: Where `at_points` is known (points,).
     """
@@ -343,10 +345,18 @@ class _Target:
     is_known: BoolArray
 
     @classmethod
-    def of(cls, loads: Loads, device: str) -> "_Target":
+    def of(cls, loads: Loads, counts: IntArray, device: str) -> "_Target":
+        # No network may say more. Pieces that touch a wall close to a charge raise the peak of a
+        # cell there to thousands of times others'.
+        most = loads.known + MOST_OVER
+        most_of_all = np.maximum.reduceat(most, np.cumsum(counts) - counts)
         known, target, at_points = (
             torch.from_numpy(array.astype(np.float32)).to(device)
-            for array in (loads.known, loads.target, loads.at_points)
+            for array in (
+                loads.known,
+                np.minimum(loads.target, most_of_all),
+                np.minimum(loads.at_points, most),
+            )
         )
         return cls(known, target, at_points, loads.power, ~np.isnan(loads.at_points))
 
@@ -358,8 +368,9 @@ class _Tensors:
     Attributes:
         samples: The samples.
         features: Scaled features (points, FEATURES).
-        relations: Scaled relations, in half precision: there are gigabytes of them (rows,
-            RELATIONS).
+        relations: The relations as they are: there are gigabytes of them (rows, RELATIONS).
+        center: Mean of each relation (RELATIONS,).
+        scale: Scale of each relation (RELATIONS,).
         traits: Scaled traits (pieces, TRAITS).
         area_m2: Wall area represented by each point (points,).
         starts: Index of the first point of each sample (samples,).
@@ -371,6 +382,8 @@ class _Tensors:
     samples: Samples
     features: Tensor
     relations: Tensor
+    center: Tensor
+    scale: Tensor
     traits: Tensor
     area_m2: Tensor
     starts: IntArray
@@ -380,18 +393,29 @@ class _Tensors:
 
     @classmethod
     def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray, device: str) -> "_Tensors":
-        bounds = np.split(np.arange(INPUTS), (FEATURES, FEATURES + RELATIONS))
-        given: tuple[AnyFloats, ...] = samples.features, samples.relations, samples.traits
-        kinds: tuple[type[np.floating[Any]], ...] = np.float32, np.float16, np.float32
-        features, relations, traits = (
-            torch.from_numpy(_bounded(item, mean[own], scale[own], kind)).to(device)
-            for item, own, kind in zip(given, bounds, kinds, strict=True)
+        of_features, of_relations, of_traits = np.split(
+            np.arange(INPUTS), (FEATURES, FEATURES + RELATIONS)
         )
-        area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32)).to(device)
+        relations = torch.from_numpy(samples.relations).to(device)
+        features, center, scales, traits, area_m2 = (
+            torch.from_numpy(array.astype(np.float32)).to(device)
+            for array in (
+                bounded(samples.features, mean[of_features], scale[of_features]),
+                mean[of_relations],
+                scale[of_relations],
+                bounded(samples.traits, mean[of_traits], scale[of_traits]),
+                samples.area_m2,
+            )
+        )
         numbers = samples.counts, samples.counts * samples.solids, samples.pieces
         starts, rows, pieces = (np.cumsum([0, *counts[:-1]]) for counts in numbers)
-        of_all = features, relations, traits, area_m2
+        of_all = features, relations, center, scales, traits, area_m2
         return cls(samples, *of_all, starts, rows, pieces, device)
+
+    def related(self, rows: Tensor) -> Tensor:
+        """Return the scaled relations of some rows (rows, RELATIONS)."""
+        scaled = (self.relations[rows].float() - self.center) / self.scale
+        return scaled.clamp_(-MOST_SPREADS, MOST_SPREADS)
 
     def loss(
         self,
@@ -544,17 +568,6 @@ def _some_points(count: int, rng: np.random.Generator) -> IntArray:
     return found
 
 
-def _bounded(
-    numbers: AnyFloats, mean: FloatArray, scale: FloatArray, kind: type[np.floating[Any]]
-) -> AnyFloats:
-    """Return `bounded` in another precision, part by part: there are gigabytes of relations."""
-    found = np.empty(numbers.shape, dtype=kind)
-    for first in range(0, len(numbers), _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
-        found[part] = bounded(numbers[part].astype(np.float64), mean, scale)
-    return found
-
-
 class _Stack(nn.Module):
     """Networks during their fit, all on the same samples: a third of the time of one by one.
 
@@ -583,8 +596,8 @@ class _Stack(nn.Module):
         # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sums give the load.
         layers = [*self.layers]
         first, first_bias, second, second_bias, last, last_bias = layers[12:]
-        structures = _two_layers(data.relations[rows.structures].float(), layers[:4])
-        pieces = _two_layers(data.relations[rows.related].float(), layers[4:8])
+        structures = _two_layers(data.related(rows.structures), layers[:4])
+        pieces = _two_layers(data.related(rows.related), layers[4:8])
         # Each message of a piece is weighted, number by number, by its traits.
         weights = _two_layers(data.traits[rows.pieces], layers[8:12])
         pieces = pieces * weights.index_select(1, rows.piece)

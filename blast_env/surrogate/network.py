@@ -66,7 +66,7 @@ PEAK_POWER: Final = 16.0
 _MOST_BYTES: Final = 10_000_000
 """Largest file of a surrogate: some eighty networks."""
 
-_MOST_SPREADS: Final = 4.0
+MOST_SPREADS: Final = 4.0
 """Bound on the distance of inputs from their mean, in units of their scale."""
 
 _SENDING: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,))
@@ -495,7 +495,7 @@ class Surrogate:
 
     @cached_property
     def _scales(self) -> Scales:
-        return Scales(self.mean, 1.0 / self.scale, _MOST_SPREADS)
+        return Scales(self.mean, 1.0 / self.scale, MOST_SPREADS)
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return the scaled and bounded features of points (points, FEATURES)."""
@@ -518,7 +518,7 @@ def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatAr
     A wall of 60 m has points much farther from its edges than the sites of a fit, and predictions
     so far outside that range are unbounded.
     """
-    found: FloatArray = np.clip((numbers - mean) / scale, -_MOST_SPREADS, _MOST_SPREADS)
+    found: FloatArray = np.clip((numbers - mean) / scale, -MOST_SPREADS, MOST_SPREADS)
     return found
 
 

@@ -637,7 +637,7 @@ def test_it_learns_from_messages_what_ways_do_not_see() -> None:
 
 def test_loads_that_are_no_numbers_stop_a_fit() -> None:
     samples = Samples.of(table_of_guesses(by_hand(), 10), {YARD.content_hash: YARD})
-    target = np.full_like(samples.impulse.target, np.inf)
+    target = np.full_like(samples.impulse.target, np.nan)
     odd = replace(samples, impulse=replace(samples.impulse, target=target))
     every = np.ones(len(samples), dtype=bool)
     with pytest.raises(BlastEnvError, match="networks of seed 0 in epoch 0: no finite error"):
