@@ -54,7 +54,7 @@ def pooled(samples: Samples) -> FloatArray:
     sizes = samples.counts[:, None]
     features = samples.features
     rows = samples.counts * samples.solids
-    sums = np.add.reduceat(samples.relations, np.cumsum(rows) - rows)
+    sums = np.add.reduceat(samples.relations, np.cumsum(rows) - rows, dtype=np.float64)
     return np.hstack(
         (
             np.add.reduceat(features, starts) / sizes,

@@ -54,21 +54,8 @@ from studies.blast_table import COLUMNS
 from studies.site_blasts import SiteBlasts, kept_rows
 from studies.site_names import held_out_names, scenario_of, site_names
 
-DATA: Final = tuple(
-    Path(f"docs/data/{name}_site_blasts.parquet")
-    for name in (
-        "front",
-        "close",
-        "many",
-        "kerb",
-        "street",
-        "liked",
-        "module",
-        "further",
-        "later",
-        "strong",
-    )
-)
+_TABLES: Final = "front close many kerb street liked module further later strong"
+DATA: Final = tuple(Path(f"docs/data/{name}_site_blasts.parquet") for name in _TABLES.split())
 """Data of the packaged surrogate: blasts on generated sites."""
 
 EVERY: Final = 8
