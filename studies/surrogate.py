@@ -45,7 +45,15 @@ from blast_env.surrogate.fitting import (
     folds,
     predictions,
 )
-from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor, least_sites
+from blast_env.surrogate.intervals import (
+    COVERAGE,
+    IMPULSE_LEAST_SPREAD,
+    PEAK_LEAST_SPREAD,
+    covered,
+    interval_factor,
+    least_sites,
+    widened,
+)
 from blast_env.surrogate.network import Check, Fit, Networks, Surrogate, load_surrogate
 from blast_env.surrogate.samples import Loads, Samples
 from blast_env.tables import markdown_table
@@ -227,8 +235,11 @@ def fit_it(
         fitted = fit(samples, ~held_out, epochs, seed, about, device=device)
         seconds = round(perf_counter() - began_s, 1)
         impulse, peak = (
-            Holdout.of(fitted, networks, samples, loads, held_out, seed)
-            for networks, loads in ((fitted.impulse, samples.impulse), (fitted.peak, samples.peak))
+            Holdout.of(fitted, networks, samples, loads, held_out, least, seed)
+            for networks, loads, least in (
+                (fitted.impulse, samples.impulse, IMPULSE_LEAST_SPREAD),
+                (fitted.peak, samples.peak, PEAK_LEAST_SPREAD),
+            )
         )
         off = LoadErrors(impulse.errors, peak.errors)
         print_line(_errors_table({f"{sites} held-out sites": off}))
@@ -286,6 +297,7 @@ class Holdout:
         samples: Samples,
         loads: Loads,
         held_out: BoolArray,
+        least_spread: float,
         seed: int,
     ) -> "Holdout":
         """Compare the predictions of `networks` with the held-out loads."""
@@ -293,15 +305,17 @@ class Holdout:
         target, sites = loads.target[held_out], samples.site[held_out]
         off = found.log_load - target
         errors = errors_of(found, target, samples.case[held_out])
+        spread = widened(found.spread, least_spread)
         check = Check(
             rms=round(errors.rms, 4),
             rank=round(errors.rank, 4),
             lost=round(errors.lost, 4),
-            spreads=round(interval_factor(off, found.spread, sites), 3),
+            spreads=round(interval_factor(off, spread, sites), 3),
+            least_spread=least_spread,
         )
         halves = folds(sites, _HALVES, seed)
-        inside = covered(off, found.spread, sites, halves)
-        return cls(errors, Covered(inside, np.abs(off) / found.spread), check)
+        inside = covered(off, spread, sites, halves)
+        return cls(errors, Covered(inside, np.abs(off) / spread), check)
 
 
 class Covered(NamedTuple):
@@ -309,7 +323,7 @@ class Covered(NamedTuple):
 
     Attributes:
         inside: Whether each load lies in its interval (samples,).
-        spreads: Magnitude of the error of its prediction, in spreads of the networks (samples,).
+        spreads: Magnitude of the error of its prediction, in spreads (samples,).
     """
 
     inside: BoolArray
@@ -379,7 +393,8 @@ def check(
 
 def _covered(found: Predictions, loads: Loads, record: Check) -> Covered:
     """Return which loads lie in the intervals that a fit has set."""
-    spreads = np.abs(found.log_load - loads.target) / found.spread
+    spread = widened(found.spread, record.least_spread)
+    spreads = np.abs(found.log_load - loads.target) / spread
     return Covered(spreads <= record.spreads, spreads)
 
 

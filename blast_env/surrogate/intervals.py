@@ -2,7 +2,9 @@
 
 The networks of an ensemble differ too little where all of them are wrong. The width of an interval
 is therefore the spread of the networks times a factor that the errors on held-out sites set
-(Angelopoulos & Bates 2023, section 2.3). Loads of one site are alike, so that a site, not a load,
+(Angelopoulos & Bates 2023, section 2.3). Where they agree closely they may all be wrong alike, so
+that a least spread adds to theirs: with it one factor serves sites of all kinds better, and
+intervals are narrower. Loads of one site are alike, so that a site, not a load,
 is the unit: each has the same weight (Dunn, Wasserman & Ramdas 2023).
 """
 
@@ -16,6 +18,18 @@ from blast_env.errors import BlastEnvError
 
 COVERAGE: Final = 0.95
 """Share of the loads of a new site that lie in their intervals."""
+
+IMPULSE_LEAST_SPREAD: Final = 0.01
+"""Least spread of ln(impulse)."""
+
+PEAK_LEAST_SPREAD: Final = 0.03
+"""Least spread of ln(peak overpressure)."""
+
+
+def widened(spreads: FloatArray, least: float) -> FloatArray:
+    """Return spreads of networks with a least spread added, as of independent errors."""
+    found: FloatArray = np.hypot(spreads, least)
+    return found
 
 
 def interval_factor(

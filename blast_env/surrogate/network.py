@@ -26,6 +26,7 @@ from blast_env.geometry import Element
 from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
+from blast_env.surrogate.intervals import widened
 from blast_env.surrogate.layers import SingleArray, two_layers
 from blast_env.surrogate.loads import (
     LEAST_OVER,
@@ -91,8 +92,10 @@ class Check(BaseModel):
         rank: Rank correlation with the engine among the layouts of a case.
         lost: Regret of a choice by prediction: excess of the load of the layout with the best
             prediction over the least load of the case, relative to the largest.
-        spreads: Half-width of the 95 % interval of ln load, in standard deviations among the
-            networks (`intervals.interval_factor`).
+        spreads: Half-width of the 95 % interval of ln load, in spreads
+            (`intervals.interval_factor`).
+        least_spread: What adds to the standard deviation among the networks for such a spread
+            (`intervals.widened`).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -101,6 +104,7 @@ class Check(BaseModel):
     rank: float
     lost: float
     spreads: Annotated[float, Field(gt=0.0)]
+    least_spread: Annotated[float, Field(ge=0.0)]
 
 
 class Fit(BaseModel):
@@ -120,7 +124,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[6] = 6
+    format: Literal[7] = 7
     command: str
     versions: dict[str, str]
     engine: str
@@ -453,7 +457,8 @@ class Surrogate:
                     "this surrogate has no intervals: `python -m studies.surrogate fit` writes one "
                     "that has"
                 )
-            found: FloatArray = loads * np.exp(check.spreads * spread * half_widths)
+            width = check.spreads * widened(spread, check.least_spread)
+            found: FloatArray = loads * np.exp(width * half_widths)
             return found
 
         impulse_pa_s = moved(guess.impulse_pa_s, guess.spread, self.fit.impulse)

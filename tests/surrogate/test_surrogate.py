@@ -64,6 +64,7 @@ from blast_env.surrogate import (
     site_of,
     solid_relations,
 )
+from blast_env.surrogate.intervals import widened
 from studies.blast_table import COLUMNS
 from studies.surrogate import Holdout, Recipe, verdict
 from tests.catalogue_sites import wide_yard
@@ -74,7 +75,7 @@ NOTHING = np.empty((0, 5))
 FAST = GasEngine(border_m=0.0, until=0.02)
 YARD = wide_yard()
 PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
-CHECK = Check(rms=0.2, rank=0.8, lost=0.03, spreads=10.0)
+CHECK = Check(rms=0.2, rank=0.8, lost=0.03, spreads=10.0, least_spread=0.0)
 ABOUT = Fit(command="by hand", versions={}, engine="made up", blasts=1, sites=1, impulse=CHECK)
 
 
@@ -488,7 +489,8 @@ def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
 
 
 def test_intervals_are_as_wide_as_their_factors_say() -> None:
-    about = ABOUT.model_copy(update={"peak": Check(rms=0.2, rank=0.8, lost=0.03, spreads=4.0)})
+    peak = Check(rms=0.2, rank=0.8, lost=0.03, spreads=4.0, least_spread=0.07)
+    about = ABOUT.model_copy(update={"peak": peak})
     surrogate = replace(by_hand(), fit=about)
     layout, (threat,) = random_layout(YARD, np.random.default_rng(0)), draw_threats(PEAKS, [0])
     guess = surrogate.guess(site_of(PEAKS), [layout], [threat.charge_against(PEAKS, layout)])
@@ -496,7 +498,7 @@ def test_intervals_are_as_wide_as_their_factors_say() -> None:
     low, high = surrogate.lower_ends(guess), surrogate.upper_ends(guess)
     for loads, own_spread, factor in (
         ("impulse_pa_s", guess.spread, CHECK.spreads),
-        ("peak_pa", guess.peak_spread, 4.0),
+        ("peak_pa", np.hypot(guess.peak_spread, 0.07), 4.0),
     ):
         below, middle, above = (getattr(item, loads) for item in (low, guess, high))
         assert (below < middle).all()
@@ -843,11 +845,11 @@ def test_held_out_loads_set_the_intervals() -> None:
     every = np.ones(len(samples), dtype=bool)
     found = predictions(fitted, fitted.impulse, samples, samples.impulse, every)
     spreads = np.where(samples.site % 80 == 0, 3.0, np.linspace(0.5, 1.0, len(samples)))
-    loads = replace(samples.impulse, target=found.log_load + spreads * found.spread)
+    loads = replace(samples.impulse, target=found.log_load + spreads * widened(found.spread, 0.02))
     held_out = samples.site < 120
-    joined = Holdout.of(fitted, fitted.impulse, samples, loads, held_out, 0)
+    joined = Holdout.of(fitted, fitted.impulse, samples, loads, held_out, 0.02, 0)
     assert 0.85 < joined.check.spreads < 0.9
-    off = (spreads * found.spread)[held_out]
+    off = (spreads * widened(found.spread, 0.02))[held_out]
     assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))
     far = spreads[held_out] > 2.0
     assert not joined.covered.inside[far].any()
