@@ -192,8 +192,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.packaged_agent train out/packaged/shown.jsonl": "--visits 4 --checked 2",
     "python -m studies.packaged_agent train --visits 1500": "--visits 4 --checked 2",
-    "python -m studies.packaged_agent train --visits 0 --first 160 --checked 42": "--checked 2",
-    "python -m studies.packaged_agent train --visits 300 --first 160 --checked 42 --seeds 5": (
+    "python -m studies.packaged_agent train --visits 1500 --first 160 --checked 42 --seeds 3": (
         "--visits 4 --checked 2 --seeds 1"
     ),
     "python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 20": (
