@@ -11,7 +11,7 @@ from blast_env.evaluation.engines import BlastResult
 from blast_env.evaluation.record import StructureLoad, on_buildings
 from blast_env.geometry import layout_counts
 from blast_env.site.blast_site import Charge
-from blast_env.tables import table_records
+from blast_env.tables import number_or_none, table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 if TYPE_CHECKING:  # Numba takes half a second to import
@@ -178,8 +178,12 @@ def blast_record(result: "BlastResult | GasResult") -> dict[str, object]:
     The modules and the single parameters, which the preset implies, are in the workbook.
     """
     loads, error = _loads(result)
-    impulse = {
-        load.name: {"pa_s": load.impulse_pa_s, "in_range": load.in_range, "notes": load.notes}
+    impulse: dict[str, object] = {
+        load.name: {
+            "pa_s": number_or_none(load.impulse_pa_s),
+            "in_range": load.in_range,
+            "notes": load.notes,
+        }
         for load in loads
     }
     content: dict[str, object] = {

@@ -80,7 +80,7 @@ from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import CVAR_LEVEL
-from blast_env.tables import write_csv
+from blast_env.tables import number_or_none, write_csv
 from blast_env.units import MS_PER_S
 
 if TYPE_CHECKING:
@@ -379,8 +379,10 @@ def _provenance(
             "unit": problem.scenario.objective.unit,
             "threats_met": result.threats,
             "held_out_threats": 0 if checked is None else len(checked.threats),
-            "held_out_reduction": None if checked is None else checked.mean_reduction,
-            "held_out_reduction_ci95": [None if np.isnan(end) else float(end) for end in ends],
+            "held_out_reduction": None
+            if checked is None
+            else number_or_none(checked.mean_reduction),
+            "held_out_reduction_ci95": [number_or_none(float(end)) for end in ends],
         },
     }
 

@@ -4,6 +4,7 @@ A front looks west at a charge. A porch touches all of it, or another building l
 it, which two walls fill. On some sites a house beside it can be judged.
 """
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -170,6 +171,19 @@ def test_the_response_of_a_hidden_building_is_no_number_as_is_its_load(cache: Pa
     hidden = site("porch", objective={"kind": "response"})
     with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front: no air"):
         evaluate_layout(hidden, (), threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
+
+
+def test_json_has_null_where_pieces_hide_a_building(tmp_path: Path, cache: Path) -> None:
+    scenario = site("other")
+    found = evaluate_layout(scenario, WALLS, threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
+    written = json.loads(found.to_json(tmp_path / "evaluation.json").read_text())
+    assert written["result"]["cvar"] is None
+    assert written["result"]["objective"]["load"] is None
+    save_scenario(scenario, tmp_path / "site.toml")
+    write_layout(tmp_path / "layout.json", scenario, WALLS, {})
+    files = str(tmp_path / "site.toml"), "--layout", str(tmp_path / "layout.json")
+    done = CliRunner().invoke(app, ["simulate", *files, "--engine", "gas", "--json"])
+    assert json.loads(done.stdout)["impulse"]["front"]["pa_s"] is None
 
 
 def test_the_worst_charge_is_found_where_a_building_is_hidden_under_another(cache: Path) -> None:
