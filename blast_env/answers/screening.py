@@ -56,6 +56,8 @@ def screening_answer(
     title = f"{scenario.name}, {behind}: worst place by damage"
     yield Table.of(title, _THREATS, rows, 2)
     yield from lines(without_facade_words(scenario), "flag")
+    hidden = "other structures stand before all of each bay: it is not screened"
+    yield from lines((f"{building}: {hidden}" for building in found.hidden), "flag")
     for threat in found.threats:
         if threat.may_be_low:
             yield Line.of(_low_words(threat), kind="flag")

@@ -180,8 +180,11 @@ def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
 def response_words(found: Sequence[FacadeResponse]) -> tuple[str, str, str, str]:
     """Return the level of protection, the broken panes, the worst pane and the worst panel.
 
-    They are those of facades under one charge, in words; a dash without panes or panels.
+    They are those of facades under one charge, in words; a dash without panes or panels, or without
+    any facade.
     """
+    if not found:
+        return "-", "-", "-", "-"
     panes = sum(facade_response.panes for facade_response in found)
     conditions = [
         facade_response.worst_condition for facade_response in found if facade_response.panes

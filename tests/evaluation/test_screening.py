@@ -169,6 +169,15 @@ def test_bays_that_something_covers_in_part_count_and_those_of_party_walls_do_no
     assert west(balcony) == pytest.approx(alone)
     assert west(next_house) == {}
     document["structures"][0]["faces"] = ["west"]
+    outline_m = [[44.0, 14.0], [50.0, 14.0], [50.0, 26.0], [44.0, 26.0]]
+    house = document["structures"][0] | {"name": "house", "outline_m": outline_m}
+    structures = [*document["structures"], next_house, house]
+    both = Scenario.from_document(document | {"structures": structures}, "two")
+    found = screen(both, (), (), atlas)
+    assert found.hidden == ("office",)
+    parts = screening_answer(both, (), found, [Requirement.parsed("low")])
+    flags = [part.text() for part in parts if isinstance(part, Line) and part.kind == "flag"]
+    assert "office: other structures stand before all of each bay: it is not screened" in flags
     with pytest.raises(BlastEnvError, match=r"'hut'.*office/west/1/1.*no bay can be screened"):
         west(next_house)
 

@@ -205,6 +205,7 @@ class Screening:
         parts: The panes and panels of the site's bays, each once, of the sizes that they have.
         storey_m: The most frequent height of a storey, the span of walls.
         knows_surroundings: Whether the atlas changed the loads.
+        hidden: Buildings with a facade of which structures cover every bay.
     """
 
     threats: tuple[ThreatScreening, ...]
@@ -213,6 +214,7 @@ class Screening:
     parts: tuple[Pane | Panel, ...]
     storey_m: float
     knows_surroundings: bool = True
+    hidden: tuple[str, ...] = ()
 
     @property
     def left_out(self) -> str:
@@ -304,7 +306,17 @@ def screen(
         _parts_of(bays),
         max(set(storeys), key=storeys.count),
         atlas is not None,
+        _hidden(scenario, bays, facade.bays),
     )
+
+
+def _hidden(
+    scenario: Scenario, bays: Iterable[FacadeBay], free: Iterable[FacadeBay]
+) -> tuple[str, ...]:
+    """Return the buildings of some bays that have none among the free ones."""
+    names = scenario.building_names
+    every, left = ([names[own.bay.structure] for own in group] for group in (bays, free))
+    return tuple(name for name in dict.fromkeys(every) if name not in left)
 
 
 def stand_offs(
