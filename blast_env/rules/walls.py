@@ -431,6 +431,8 @@ class _View:
         # 1. What each place adds to the wall. Rounded, so that values that differ only by rounding
         #    are equal.
         places, half_width_m = np.flatnonzero(possible), float(self.half_width_m[number])
+        if not len(places):
+            return None
         aside_m = end.side * self.aside_m[number].ravel()[places]
         start_m, gain_m = aside_m - half_width_m, aside_m + half_width_m - end.reach_m
         off_m = np.abs(self.depth_m[number].ravel()[places] - wall_m).round(9)

@@ -25,7 +25,7 @@ from blast_env.site import (
     Scenario,
     find_scenario,
 )
-from blast_env.site.structures import is_open_below
+from blast_env.site.structures import ground_m, is_open_below
 from blast_env.sites.sight_bits import SightBits, Words, take_next
 from blast_env.units import MODULE_SIDE_M
 
@@ -112,7 +112,9 @@ class Visibility:
             over &= (share == 1.0) | (ends_m == 0.0) | (share * ends_m >= high_m)
         open_share *= float(weight[over].sum() / max(weight.sum(), 1e-300))
         height_m = (ends_m.reshape(TARGETS, -1, 1, 1) * along_share).reshape(-1, *cut.shape[1:])
-        height_m -= LayoutState.empty(scenario).empty_zone.ground_m
+        ground = ground_m(scenario.structures, scenario.zone.boxes)
+        if ground.any():
+            height_m -= ground
         cut = np.tile(cut, (TARGETS, 1, 1))
         if over.all():  # the usual case, without copies
             return cls(weight, cut, height_m, open_share)
@@ -419,24 +421,21 @@ def _gains(weight: FloatArray, cut: BoolArray) -> FloatArray:
 def _cut_by_legal(lines: Visibility, placement: LayoutState) -> BoolArray:
     """Return whether each legal action would cut each line (lines, legal actions)."""
     catalogue, legal = placement.catalogue, placement.legal.reshape(len(placement.legal), -1)
-    count, ends = len(lines.weight), np.cumsum(legal.sum(axis=1))
-    found = np.zeros((count, ends[-1]), dtype=bool)
+    ends = np.cumsum(legal.sum(axis=1))
+    found = np.zeros((len(lines.weight), ends[-1]), dtype=bool)
     by_height: dict[float | None, BoolArray] = {}
-    by_size: dict[tuple[float | None, int, int], BoolArray] = {}
+    cut = np.empty(lines.cut.shape, dtype=bool)  # one array for all: new memory takes time
     for variant, own, end in zip(catalogue.variants, legal, ends.tolist(), strict=True):
         if variant.is_measure or not own.any():
             continue
-        height_m, size = variant.height_m, (variant.height_m, variant.rows, variant.columns)
-        if height_m not in by_height:
-            by_height[height_m] = lines.cut_by(height_m)
-        if size not in by_size:
-            # As if the cells of all lines were in one row. What reaches beyond a side of the zone
-            # meets other cells there, but no such piece is legal.
-            cut = by_height[height_m].copy()
-            take_next(cut.reshape(-1, catalogue.shape[1]), 0, variant.rows)
-            take_next(cut.reshape(-1), 0, variant.columns)
-            by_size[size] = cut.reshape(count, own.size)
-        found[:, end - own.sum() : end] = by_size[size].compress(own, axis=1)
+        if variant.height_m not in by_height:
+            by_height[variant.height_m] = lines.cut_by(variant.height_m)
+        cut[...] = by_height[variant.height_m]
+        # As if the cells of all lines were in one row. What reaches beyond a side of the zone meets
+        # other cells there, but no such piece is legal.
+        take_next(cut.reshape(-1, catalogue.shape[1]), 0, variant.rows)
+        take_next(cut.reshape(-1), 0, variant.columns)
+        found[:, end - own.sum() : end] = cut.reshape(len(cut), own.size).compress(own, axis=1)
     return found
 
 
