@@ -43,6 +43,14 @@ OTHERS: Final = {
     "porch": block("porch", 5.5, 2.0, 8, 1, height_m=3.0),
     "other": block("other", 4.5, 2.0, 8, 2, height_m=3.0),
     "annex": block("annex", 7.0, 2.0, 8, 2, **GLAZED, building="front"),
+    "kiosk": {
+        "kind": "polygon",
+        "name": "kiosk",
+        "outline_m": [[8.0, 3.0], [9.0, 3.0], [9.0, 4.0], [8.0, 4.0]],
+        "height_m": 3.0,
+        "protected": True,
+        "facade": {"bay_m": 4.0, "glazing": "window_laminated_6"},
+    },
     "house": block("house", 8.0, 2.0, 8, 2, **GLAZED),
 }
 WALLS: Final[Layout] = tuple(Piece(row, 1, "wall", True) for row in (0, 4))
@@ -100,6 +108,14 @@ def test_a_verdict_on_the_others_is_flagged_with_the_building(cache: Path) -> No
     assert replace(judged, responses=(), unchecked=()).is_flagged
     parts = Document.of(assess.assessment(blasts, found, LevelOfProtection.LOW, 0.1)).parts
     assert f"flag: {HIDDEN}" in [part.text() for part in parts if isinstance(part, Line)]
+
+
+def test_a_facade_whose_walls_are_too_short_for_a_bay_is_named(cache: Path) -> None:
+    """Walls of a polygon that are shorter than half a bay have no windows."""
+    judged = consequences_of(blasts_of(site("kiosk"), (), cache))
+    assert judged.buildings == ("front",)
+    words = "kiosk: 12.0 of 12.0 m2 of its walls stand in no bay (kiosk): no verdict covers them"
+    assert words in judged.notes
 
 
 def test_the_table_of_buildings_has_a_row_without_a_verdict(cache: Path) -> None:
