@@ -74,6 +74,8 @@ def test_other_names_and_other_files_are_refused(tmp_path: Path) -> None:
 def test_published_blasts_are_served_for_the_same_cells_and_version(
     rows: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # They are read once for all tests here.
+    monkeypatch.setattr("blast_env.benchmark.data.published.load", lambda: rows)
     row = rows[rows["table"] == "many_site_blasts"].iloc[0]
     site, store = scenario_of(row["scenario"]), BlastStore(size=100)
     # The tables may be older than the engine.

@@ -30,7 +30,8 @@ def remember_published(store: BlastStore, scenarios: Iterable[Scenario]) -> int:
         scenarios: The scenarios whose blasts are kept.
     """
     engine, table, count = find_engine("gas", 0.5), load(), 0
-    table = table[table["engine"].map(_version) == _version(engine.version)]
+    versions = {text: _version(text) for text in table["engine"].unique()}
+    table = table[table["engine"].map(versions) == _version(engine.version)]
     for scenario in scenarios:
         evaluator = BlastEvaluator(scenario, engine, cache=store)
         catalogue = LayoutState.empty(scenario).catalogue
