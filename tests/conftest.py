@@ -3,6 +3,7 @@
 import gc
 import multiprocessing
 import os
+import sys
 from collections.abc import Iterator
 
 # Two threads for small sums cost many times what one does where workers share the cores. Set before
@@ -14,7 +15,13 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from tests.coverage import RARE
 from tests.figures import DRAW, undrawn_figures
+
+# Its workers do not ask for it. Set before the package is imported.
+measured = getattr(sys.modules.get("slipcover.pytest_plugin"), "_slipcover_instance", None)
+if measured is not None:
+    measured.d_miss_threshold = RARE
 
 # The modules that tests import, and the tests, all stay: it would look through them for nothing,
 # which takes a third of their time. Afterwards most of what becomes garbage needs no collector.
