@@ -53,14 +53,15 @@ def pooled(samples: Samples) -> FloatArray:
     starts = np.cumsum(samples.counts) - samples.counts
     sizes = samples.counts[:, None]
     features = samples.features
-    rows = samples.counts * samples.solids
-    sums = np.add.reduceat(samples.relations, np.cumsum(rows) - rows, dtype=np.float64)
+    ends = np.cumsum(samples.counts * samples.solids)[:-1]
+    # Sample by sample: in one call all rows, gigabytes in half precision, would be converted first.
+    sums = [own.sum(axis=0, dtype=np.float64) for own in np.split(samples.relations, ends)]
     return np.hstack(
         (
             np.add.reduceat(features, starts) / sizes,
             np.minimum.reduceat(features, starts),
             np.maximum.reduceat(features, starts),
-            sums / sizes,
+            np.array(sums) / sizes,
         )
     ).astype(np.float64)
 
