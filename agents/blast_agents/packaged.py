@@ -8,11 +8,11 @@ does without torch.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache, partial
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from blast_env.evaluation import DesignProblem
 from blast_env.files import read_regular, write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState, kept_clear
-from blast_env.layout.batch import LayoutBatch, PlacementRules
+from blast_env.layout.batch import LayoutBatch
 from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
 from blast_env.surrogate import Surrogate, packaged_surrogate
@@ -152,16 +152,22 @@ class CandidateNetwork:
         found: FloatArray = static @ self.weights["static"] + self.weights["first_bias"]
         return found
 
-    def scores(self, prepared: FloatArray, changing: FloatArray, whole: FloatArray) -> FloatArray:
-        """Return the score of each candidate and, last, of finishing (candidates + 1,)."""
+    def scores(
+        self, prepared: FloatArray, legal: IntArray, changing: FloatArray, whole: FloatArray
+    ) -> FloatArray:
+        """Return the score of each legal candidate and, last, of finishing (legal + 1,).
+
+        Args:
+            prepared: The part of the first layer of all candidates, as by `prepared`.
+            legal: The candidates that are legal (legal,).
+            changing: Their changing features.
+            whole: Features of site and layout.
+        """
         own = self.weights
         first = changing @ own["changing"]
-        first += prepared
-        first += whole @ own["whole"]
-        np.maximum(first, 0.0, out=first)
+        _kernels().rectify_first(first, prepared, legal, whole @ own["whole"])
         second = first @ own["second"]
-        second += own["second_bias"]
-        np.maximum(second, 0.0, out=second)
+        _kernels().rectify(second, own["second_bias"])
         finish = np.maximum(whole @ own["finish_first"] + own["finish_first_bias"], 0.0)
         return np.append(second @ own["score"], finish @ own["finish"] + own["finish_bias"])
 
@@ -352,10 +358,9 @@ class PackagedAgent:
             begun: Candidates that stand at first in each, if any do.
             tell: Called with each decision.
         """
-        prepared = self.network.prepared(candidates.static)
-        rules = PlacementRules.of(candidates.empty)
-        batch = LayoutBatch(candidates.empty, rules, count)
-        batch.begin(range(count), rules, candidates.empty)
+        prepared = _prepared(self.network, candidates)
+        batch = LayoutBatch(candidates.empty, candidates.rules, count)
+        batch.begin(range(count), candidates.rules, candidates.empty)
         parts = begun or [()] * count
         for step in range(max(map(len, parts))):
             own = [index for index, part in enumerate(parts) if len(part) > step]
@@ -368,29 +373,40 @@ class PackagedAgent:
             sharing: dict[frozenset[int], list[int]] = {}
             for index in open_ones:
                 sharing.setdefault(placed[index], []).append(index)
-            grown, chosen = {}, []
+            chosen: dict[int, tuple[Standing, int]] = {}
             for pieces, indices in sharing.items():
                 state = standing[pieces]
                 legal = np.flatnonzero(batch.legal[indices[0]].ravel()[candidates.numbers])
                 changing = state.features(legal)
                 whole = state.whole(legal, changing, int(batch.left[indices[0], 0]))
-                scores = self.network.scores(prepared[legal], changing, whole)
+                scores = self.network.scores(prepared, legal, changing, whole)
                 choices = _choices(scores, len(indices), rng)
                 tell(Decision(legal, changing, whole, scores, indices, choices))
                 for index, choice in zip(indices, choices, strict=True):
-                    if choice == len(legal):
-                        continue
-                    candidate = int(legal[choice])
-                    placed[index] = pieces | {candidate}
-                    chosen.append((index, candidate))
-                    if placed[index] not in grown:
-                        grown[placed[index]] = state.copy()
-                        grown[placed[index]].add(candidate)
-            standing = grown
-            going_on = [index for index, _ in chosen]
-            batch.place(going_on, [int(candidates.numbers[own]) for _, own in chosen])
-            open_ones = [index for index in going_on if not batch.is_full[index]]
+                    if choice < len(legal):
+                        chosen[index] = state, int(legal[choice])
+            batch.place([*chosen], [int(candidates.numbers[own]) for _, own in chosen.values()])
+            open_ones, standing = [], {}
+            for index, (state, candidate) in chosen.items():
+                placed[index] |= {candidate}
+                if not batch.is_full[index]:
+                    open_ones.append(index)
+                    if placed[index] not in standing:
+                        standing[placed[index]] = state.grown(candidate)
         return tuple(batch.elements(index) for index in range(count))
+
+
+@lru_cache(maxsize=1)
+def _prepared(network: CandidateNetwork, candidates: Candidates) -> FloatArray:
+    """Return the part of the first layer that does not change, of all calls for one site."""
+    return network.prepared(candidates.static)
+
+
+@cache
+def _kernels() -> Any:
+    from blast_agents.policies import candidate_kernels  # Numba takes long to import
+
+    return candidate_kernels
 
 
 def _choices(scores: FloatArray, count: int, rng: np.random.Generator | None) -> Sequence[int]:

@@ -9,8 +9,8 @@ same features, and their number does not depend on the site.
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final, NamedTuple
+from functools import cache, cached_property
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from blast_env.design.search.learnt import case_for
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Rectangle
 from blast_env.layout import LayoutState, kept_clear
+from blast_env.layout.batch import PlacementRules
 from blast_env.layout.build_site import vehicle_reach
 from blast_env.rules import RULES, line_of_posts, posts_and_wall
 from blast_env.site import AnyCharge, Scenario
@@ -237,9 +238,14 @@ class Candidates:
         )
 
     @cached_property
-    def parts(self) -> IntArray:
-        """Number of the part of the bearings that each hides (places, candidates)."""
-        return self.first * (BEARINGS + 1) + self.last
+    def posts(self) -> int:
+        """Number of candidates of the line of posts."""
+        return int(self.is_post.sum())
+
+    @cached_property
+    def rules(self) -> PlacementRules:
+        """The rules of placing on the site."""
+        return PlacementRules.of(self.empty)
 
     @cached_property
     def _index(self) -> dict[int, int]:
@@ -448,17 +454,16 @@ def _in_reach(scenario: Scenario, boxes_m: FloatArray) -> FloatArray:
     return found
 
 
-def _sums_of_parts(values: FloatArray) -> FloatArray:
-    """Return the sums from each bearing to before each other (BEARINGS + 1 squared,)."""
-    up_to = np.append(0.0, np.cumsum(values))
-    sums: FloatArray = (up_to - up_to[:, np.newaxis]).ravel()
-    return sums
+def _sums_up_to(values: FloatArray) -> FloatArray:
+    """Return the sum up to before each bearing (BEARINGS + 1,)."""
+    return np.append(0.0, np.cumsum(values))
 
 
-_LENGTHS: Final = np.maximum(
-    np.arange(BEARINGS + 1) - np.arange(BEARINGS + 1)[:, np.newaxis], 1
-).ravel()
-"""Number of bearings from each to before each other, at least 1."""
+@cache
+def _kernels() -> Any:
+    from blast_agents.policies import candidate_kernels  # Numba takes long to import
+
+    return candidate_kernels
 
 
 class Standing:
@@ -477,9 +482,9 @@ class Standing:
         count = len(candidates.numbers)
         self._of = candidates
         self._covered = np.zeros_like(candidates.shares)
-        # Gap to the nearest piece, distances along and aside of it, and whether it is alike.
+        # Gap to the nearest piece, and its candidate.
         self._gap_m = np.full(count, np.inf, dtype=np.float32)
-        self._beside = np.zeros((4, count), dtype=np.float32)
+        self._nearest = np.zeros(count, dtype=np.int64)
         self.placed = 0
         self.posts = 0
         self.spent = 0.0
@@ -492,13 +497,14 @@ class Standing:
             state.add(index)
         return state
 
-    def copy(self) -> "Standing":
-        """Return an equal state that grows by itself."""
+    def grown(self, index: int) -> "Standing":
+        """Return the state with one more piece, by its candidate."""
         other = Standing.__new__(Standing)
         other._of = self._of
         other._covered, other._gap_m = self._covered.copy(), self._gap_m.copy()
-        other._beside = self._beside.copy()
+        other._nearest = self._nearest.copy()
         other.placed, other.posts, other.spent = self.placed, self.posts, self.spent
+        other.add(index)
         return other
 
     def add(self, index: int) -> None:
@@ -514,18 +520,7 @@ class Standing:
             np.maximum(
                 self._covered[place, part], of.hidden[place, index], out=self._covered[place, part]
             )
-        left, bottom, right, top = of.edges_m
-        gap_m = np.hypot(
-            np.maximum(np.maximum(left[index] - right, left - right[index]), 0.0),
-            np.maximum(np.maximum(bottom[index] - top, bottom - top[index]), 0.0),
-        )
-        nearer = np.flatnonzero(gap_m < self._gap_m)
-        self._gap_m[nearer] = gap_m[nearer]
-        along_m, aside_m = of.frame_m
-        self._beside[0, nearer] = np.abs(along_m[nearer] - along_m[index])
-        self._beside[1, nearer] = np.abs(aside_m[nearer] - aside_m[index])
-        self._beside[2, nearer] = of.item[nearer] == of.item[index]
-        self._beside[3, nearer] = of.variant[nearer] == of.variant[index]
+        _kernels().stand(index, of.edges_m, self._gap_m, self._nearest)
 
     def features(self, chosen: IntArray) -> FloatArray:
         """Return the changing features of some candidates (chosen, CHANGING)."""
@@ -534,25 +529,19 @@ class Standing:
         places = len(of.shares)
         for place in range(places):
             shares, cover = of.shares[place], self._covered[place]
-            # Sums over all parts of the bearings: candidates look theirs up.
-            open_parts = _sums_of_parts(shares * (1.0 - cover)) * (3.0 / places)
-            cover_parts = _sums_of_parts(cover) / _LENGTHS / places
-            parts = of.parts[place, chosen]
-            found[0] += open_parts.astype(np.float32)[parts] * of.hidden[place, chosen]
-            found[1] += cover_parts.astype(np.float32)[parts]
+            up_to = _sums_up_to(shares * (1.0 - cover)), _sums_up_to(cover)
+            bearings = of.first[place], of.last[place], of.hidden[place]
+            _kernels().put_covers(chosen, *bearings, *up_to, places, found[:2])
         budget = of.empty.scenario.zone.budget
         if budget:
             found[9] = of.cost[chosen] / max(budget - self.spent, 1e-9)
         if bool(np.isinf(self._gap_m[0])):
             found[2] = 1.0
         else:
-            gap_m = self._gap_m[chosen]
-            found[3] = gap_m / 3.0
-            found[4] = gap_m <= 0.0
-            found[5:9] = self._beside[:, chosen]
-            found[5:7] /= 2.0
-        clipped: FloatArray = np.minimum(np.maximum(found, -_MOST), _MOST).T
-        return clipped
+            nearest = self._gap_m, self._nearest
+            _kernels().put_relations(chosen, *nearest, of.frame_m, of.item, of.variant, found[3:9])
+        clipped: FloatArray = _kernels().clipped(found, _MOST)
+        return clipped.T
 
     def whole(self, chosen: IntArray, changing: FloatArray, stock_left: int) -> FloatArray:
         """Return the features of site and layout (WHOLE,).
@@ -577,7 +566,7 @@ class Standing:
                 len(chosen) / max(len(of.numbers), 1),
                 float(changing[:, 0].max(initial=0.0)),
                 cheapest / left if budget and left > 0.0 and len(chosen) else 0.0,
-                (int(of.is_post.sum()) - self.posts) / 10.0,
+                (of.posts - self.posts) / 10.0,
             ],
             dtype=np.float32,
         )
