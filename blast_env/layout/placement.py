@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import fsum
@@ -117,7 +118,7 @@ class LayoutState:
                 or is not available after those before it.
         """
         empty = cls.empty(scenario)
-        whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
+        whole = empty.with_legal(empty.catalogue.layout_from(layout))
         return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
 
     @cached_property
@@ -155,6 +156,18 @@ class LayoutState:
         placed = LayoutState(self.scenario, (*self.layout, *elements))
         vars(placed).update(empty_zone=self.empty_zone)
         return placed
+
+    def with_those_legal(self, elements: Sequence[Element]) -> "LayoutState":
+        """Return the placement with further elements, in their order, without illegal ones."""
+        with suppress(LayoutError):
+            whole = self.with_legal(self.catalogue.layout_from(elements))
+            if whole._is_sound:
+                return whole
+        placement = self
+        for element in elements:
+            with suppress(LayoutError):
+                placement = placement.place(element)
+        return placement
 
     def _is_known_legal(self, element: Element) -> bool:
         """Return whether the mask has been computed and has the element."""

@@ -1,16 +1,13 @@
 """Small changes of layouts; every result is legal."""
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import cos, pi, sin
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray
-from blast_env.errors import LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.layout import LayoutState
 from blast_env.rules import random_element
@@ -28,13 +25,7 @@ def legal_part(scenario: Scenario, layout: Sequence[Element]) -> LayoutState:
     Args:
         layout: Modules or pieces; those on cells outside the zone are illegal.
     """
-    with suppress(LayoutError):
-        return LayoutState.of(scenario, layout)
-    placement = LayoutState.empty(scenario)
-    for element in layout:
-        if _is_legal(placement, element):
-            placement = placement.place(element)
-    return placement
+    return LayoutState.empty(scenario).with_those_legal(layout)
 
 
 def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
@@ -127,6 +118,10 @@ class Moves:
     wall_share: float = 0.25
     count_share: float = 0.1
     item_share: float = 0.2
+    # Layouts found to be legal, as plain values: the best ones come again and again.
+    _legal: dict[Layout, Layout] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def near_best(self, best: Sequence[Layout], rng: np.random.Generator) -> Layout:
         """Return a sorted neighbour, one or two moves from a layout drawn in favour of the first.
@@ -138,14 +133,27 @@ class Moves:
         layout = drawn_by_rank(best, rng)
         for _ in range(1 + int(rng.random() < 0.4)):
             layout = self.neighbour(layout, rng)
-        return tuple(sorted(layout))
+        return self._kept(tuple(sorted(layout)))
 
     def neighbour(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Return a slightly different layout that satisfies all conditions of the zone.
 
         Illegal elements of the layout are left out.
         """
-        layout = legal_part(self.scenario, layout).layout
+        known = self._legal.get(layout)
+        layout = self._kept(legal_part(self.scenario, layout).layout) if known is None else known
+        return self._kept(self._changed(layout, rng))
+
+    def _kept(self, layout: Layout) -> Layout:
+        """Return a legal layout, known as such from now on."""
+        return self._legal.setdefault(layout, layout)
+
+    def _state(self, layout: Layout) -> LayoutState:
+        """Return the placement of a legal layout."""
+        return LayoutState.empty(self.scenario).with_legal(layout)
+
+    def _changed(self, layout: Layout, rng: np.random.Generator) -> Layout:
+        """Return a neighbour of a legal layout."""
         if not layout:
             return self._added(layout, rng)
         # One draw decides the kind of move; the shares stack up on the interval from 0 to 1.
@@ -162,7 +170,7 @@ class Moves:
 
     def _added(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Add an element near an existing one, or move one if none may be added."""
-        placement = LayoutState(self.scenario, layout)
+        placement = self._state(layout)
         if placement.is_full:
             return self._moved(layout, rng) if layout else layout
         if not layout:
@@ -175,14 +183,14 @@ class Moves:
     def _moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Move an element near its present place or near another element; its item is kept."""
         index = int(rng.integers(len(layout)))
-        rest = LayoutState(self.scenario, _without(layout, index))
+        rest = self._state(_without(layout, index))
         to_another = len(layout) > 1 and rng.random() < 0.5
         beside = _any_of(rest.layout, rng) if to_another else layout[index]
         return rest.place(self._near(rest, beside, rng, layout[index], like=layout[index])).layout
 
     def _swapped(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Remove an element and place another one at random."""
-        rest = LayoutState(self.scenario, _without(layout, int(rng.integers(len(layout)))))
+        rest = self._state(_without(layout, int(rng.integers(len(layout)))))
         return rest.place(random_element(rest, rng)).layout
 
     def _exchanged(self, layout: Layout, rng: np.random.Generator) -> Layout:
@@ -194,7 +202,7 @@ class Moves:
         there, rest = layout[index], _without(layout, index)
         if rest and rng.random() < 0.5:
             rest = _without(rest, int(rng.integers(len(rest))))
-        placement = LayoutState(self.scenario, rest)
+        placement = self._state(rest)
         wanted = 1 + int(rng.integers(3))
         while wanted and not placement.is_full:
             placement = placement.place(self._near(placement, there, rng, there))
@@ -210,7 +218,7 @@ class Moves:
         up, right = np.rint(rng.normal(0.0, self.reach_cells, 2)).astype(int).tolist()
         moved = [_shifted(element, up, right) for element in layout if element in wall]
         stay = [element for element in layout if element not in wall]
-        placement = legal_part(self.scenario, [*stay, *moved])
+        placement = self._state(tuple(stay)).with_those_legal(moved)
         # Elements that cannot be displaced are placed near those that can.
         while len(placement.layout) < len(layout) and not placement.is_full:
             if not placement.layout:
@@ -236,10 +244,10 @@ class Moves:
             but: Excluded element, unless no other is legal.
             like: Preferred item; a random one if none of it may be placed, or with `None`.
         """
-        legal, catalogue = placement.legal, placement.catalogue
-        if catalogue.has_items:
-            legal = _of_one_item(placement, rng, like)
-        numbers, rows, columns = np.nonzero(legal)
+        catalogue = placement.catalogue
+        own = _of_one_item(placement, rng, like) if catalogue.has_items else slice(None)
+        numbers, rows, columns = np.nonzero(placement.legal[own])
+        numbers += own.start or 0
         away = np.hypot(*_gaps(catalogue, (numbers, rows, columns), beside))
         if but is not None:
             same = numbers == catalogue.variant_number(but)
@@ -270,19 +278,25 @@ class Moves:
         return found
 
 
-def _of_one_item(
-    placement: LayoutState, rng: np.random.Generator, like: Element | None
-) -> BoolArray:
-    """Return the legal places (variants, rows, columns) of one item.
+def _of_one_item(placement: LayoutState, rng: np.random.Generator, like: Element | None) -> slice:
+    """Return the variants of one item that has a legal place.
 
     It is the item of `like`, or a random one if that has no legal place or `like` is `None`.
     """
-    items = np.array([variant.item for variant in placement.catalogue.variants])
-    possible = np.unique(items[placement.legal.any(axis=(1, 2))]).tolist()
-    wanted = None if like is None else placement.catalogue.variant(like).item
-    item = wanted if wanted in possible else possible[int(rng.integers(len(possible)))]
-    legal: BoolArray = placement.legal & (items == item)[:, np.newaxis, np.newaxis]
-    return legal
+    catalogue, legal = placement.catalogue, placement.legal
+    if like is not None:
+        wanted = _variants_of(catalogue, catalogue.variant(like).item)
+        if legal[wanted].any():
+            return wanted
+    every = [_variants_of(catalogue, item) for item in range(len(catalogue.names))]
+    possible = [own for own in every if legal[own].any()]
+    return possible[int(rng.integers(len(possible)))]
+
+
+def _variants_of(catalogue: Catalogue, item: int) -> slice:
+    """Return the variants of an item, which lie one behind the other."""
+    numbers = [number for number, own in enumerate(catalogue.variants) if own.item == item]
+    return slice(numbers[0], numbers[-1] + 1)
 
 
 def _gaps(
@@ -293,7 +307,7 @@ def _gaps(
     Places are the numbers of the variants, and the rows and columns of their lower left cells.
     """
     numbers, rows, columns = places
-    sizes = np.array([(variant.rows, variant.columns) for variant in catalogue.variants])[numbers]
+    sizes = np.array([*catalogue.sizes])[numbers]
     own = catalogue.variant(beside)
     up = np.maximum(rows - beside[0] - (own.rows - 1), beside[0] - rows - (sizes[:, 0] - 1))
     right = np.maximum(
