@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
+from blast_agents import packaged_agent
 
 from blast_env import load_scenario, simulate
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
@@ -77,6 +78,7 @@ def surrogate() -> None:
     for elements in ((), layout.layout):  # what is kept of a charge comes with the second
         engine.loads(site, elements, charge)
     site_of(site).approach(charge)
+    packaged_agent().propose(site, charge)
 
 
 def batches() -> None:

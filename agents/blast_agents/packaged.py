@@ -45,6 +45,9 @@ WEIGHTS: Final = "packaged_agent.safetensors"
 FEW_DRAWS: Final = 8
 """Layouts that the agent draws for one proposal."""
 
+FEW_CHANGES: Final = 24
+"""Changes of the best guesses that one proposal looks at after that."""
+
 DRAWS: Final = 32
 """Layouts that the agent draws where guesses choose among them."""
 
@@ -58,7 +61,7 @@ MOST_DRAWS: Final = 10_000
 """Largest number of layouts of one call."""
 
 _FEW_CANDIDATES: Final = 12_000
-"""Candidates in all draws of one proposal: more take it beyond 50 ms."""
+"""Candidates in all draws of one proposal: more take it far beyond 50 ms."""
 
 _MOST_REDRAWN: Final = 3
 """Most pieces that are taken away, and drawn anew, in a change."""
@@ -217,9 +220,10 @@ class PackagedAgent:
         return digest.hexdigest()[:16]
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
-        """Return the first of the policy's layout, the rules' ones, none, and a few draws.
+        """Return the first of the policy's layout, the rules' ones, none, few draws and changes.
 
-        They are as `ranked` has them. There are fewer draws where there are many candidates.
+        They are as `ranked` has them. There are fewer draws and changes where there are many
+        candidates.
 
         Raises:
             BlastEnvError: If the scenario has no build zone, or no structure is protected.
@@ -227,7 +231,7 @@ class PackagedAgent:
         found = find_scenario(scenario)
         candidates = int(LayoutState.empty(found).legal.sum())
         few = min(FEW_DRAWS, _FEW_CANDIDATES // max(candidates, 1))
-        return self.ranked(found, charge, few, changes=0)[0]
+        return self.ranked(found, charge, few, changes=FEW_CHANGES * few // FEW_DRAWS)[0]
 
     def likeliest(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the policy's layout, of the candidates with the highest scores.
