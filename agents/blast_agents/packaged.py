@@ -12,7 +12,7 @@ from functools import cache, cached_property, lru_cache, partial
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,11 +166,14 @@ class CandidateNetwork:
             changing: Their changing features.
             whole: Features of site and layout.
         """
+        from blast_agents.policies.candidate_kernels import rectify  # Numba takes long to import
+
         own = self.weights
         first = changing @ own["changing"]
-        _kernels().rectify_first(first, prepared, legal, whole @ own["whole"])
+        rectify(first, prepared, legal, whole @ own["whole"])
         second = first @ own["second"]
-        _kernels().rectify(second, own["second_bias"])
+        second += own["second_bias"]
+        np.maximum(second, 0.0, out=second)
         finish = np.maximum(whole @ own["finish_first"] + own["finish_first_bias"], 0.0)
         return np.append(second @ own["score"], finish @ own["finish"] + own["finish_bias"])
 
@@ -404,13 +407,6 @@ class PackagedAgent:
 def _prepared(network: CandidateNetwork, candidates: Candidates) -> FloatArray:
     """Return the part of the first layer that does not change, of all calls for one site."""
     return network.prepared(candidates.static)
-
-
-@cache
-def _kernels() -> Any:
-    from blast_agents.policies import candidate_kernels  # Numba takes long to import
-
-    return candidate_kernels
 
 
 def _choices(scores: FloatArray, count: int, rng: np.random.Generator | None) -> Sequence[int]:

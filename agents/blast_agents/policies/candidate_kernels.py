@@ -98,17 +98,7 @@ def put_covers(
 
 
 @compiled(nogil=True)
-def clipped(values: NDArray[np.float32], most: float) -> NDArray[np.float32]:
-    """Limit the magnitude of values (n, m) in place, and return them."""
-    limit = np.float32(most)
-    flat = values.reshape(-1)
-    for place in range(len(flat)):
-        flat[place] = min(max(flat[place], -limit), limit)
-    return values
-
-
-@compiled(nogil=True)
-def rectify_first(
+def rectify(
     values: NDArray[np.float32],
     prepared: NDArray[np.float32],
     chosen: IntArray,
@@ -127,12 +117,3 @@ def rectify_first(
         for unit in range(values.shape[1]):
             total = values[place, unit] + prepared[own, unit] + common[unit]
             values[place, unit] = max(total, none)
-
-
-@compiled(nogil=True)
-def rectify(values: NDArray[np.float32], bias: NDArray[np.float32]) -> None:
-    """Add a bias (width,) to sums (n, width), and rectify, in place."""
-    none = np.float32(0.0)
-    for place in range(len(values)):
-        for unit in range(values.shape[1]):
-            values[place, unit] = max(values[place, unit] + bias[unit], none)

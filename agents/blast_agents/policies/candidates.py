@@ -540,8 +540,9 @@ class Standing:
         else:
             nearest = self._gap_m, self._nearest
             _kernels().put_relations(chosen, *nearest, of.frame_m, of.item, of.variant, found[3:9])
-        clipped: FloatArray = _kernels().clipped(found, _MOST)
-        return clipped.T
+        clipped: Any = np.clip(found, -_MOST, _MOST, out=found)
+        changing: FloatArray = clipped.T
+        return changing
 
     def whole(self, chosen: IntArray, changing: FloatArray, stock_left: int) -> FloatArray:
         """Return the features of site and layout (WHOLE,).
