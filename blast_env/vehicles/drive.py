@@ -157,12 +157,14 @@ class Drive:
 
     Attributes:
         ground: The vehicle with its surroundings on the empty site.
+        obstacles: The obstacles of the layout.
         reach: Its reach, through the broken pieces.
         held: The pieces with a crash rating that stop it, if it reaches them.
         broken: The pieces with a crash rating that do not.
     """
 
     ground: VehicleGround
+    obstacles: Obstacles
     reach: Reach
     held: tuple[CrashPiece, ...]
     broken: tuple[CrashPiece, ...]
@@ -219,35 +221,64 @@ class Drive:
     def places_m(self) -> FloatArray:
         """Places of its charge, m (places, 2).
 
-        They include places beyond a piece that stopped it, at the penetration of the rating.
+        They include places beyond a piece that stopped it, up to the penetration of the rating.
         """
         return np.concatenate([self.reach.places_m, *self._beyond_m()])
 
     def _beyond_m(self) -> Iterator[FloatArray]:
         # A piece that stops a vehicle still lets its load through by the penetration of its rating:
         # the charge may go off there, across from each side that the vehicle reaches.
-        radius_m = self.ground.charge_radius_m
-        standing = [piece.rectangle for piece in (*self.held, *self.broken)]
-        standing += self.ground.standing_m
         for piece in self.held:
             if piece.rating.penetration_m == 0.0:
                 continue
-            beyond_m = max(piece.rating.penetration_m, radius_m)
             left, bottom, right, top = piece.rectangle
-            sides = (right + beyond_m, top + beyond_m, left - beyond_m, bottom - beyond_m)
             for number in np.flatnonzero(self.reach.touches(piece.rectangle)):
                 low, high = (bottom, top) if number % 2 == 0 else (left, right)
                 along = np.linspace(low, high, max(round((high - low) / MODULE_SIDE_M), 1) + 1)
-                across = np.full_like(along, sides[number])
-                places = np.column_stack((across, along) if number % 2 == 0 else (along, across))
-                yield places[[self._is_clear(place, radius_m, standing) for place in places]]
+                for at_m in along.tolist():
+                    yield self._flight_m(piece, int(number), at_m)
 
-    def _is_clear(self, place: FloatArray, radius_m: float, standing: Sequence[Rectangle]) -> bool:
-        """Return whether a charge fits at a place."""
+    def _flight_m(self, piece: CrashPiece, side: int, at_m: float) -> FloatArray:
+        """Return the places of a load that was thrown straight over a piece (places, 2).
+
+        It comes to rest before the first thing that stands in its way.
+
+        Args:
+            side: The side of the piece that the vehicle hits: left, lower, right, upper.
+            at_m: Where along that side.
+        """
+        radius_m = self.ground.charge_radius_m
+        # 1. The room beyond the rear, with lengths along the flight from there.
+        axis, sign = side % 2, (1.0, 1.0, -1.0, -1.0)[side]
+        rear_m = piece.rectangle[(side + 2) % 4]
+        border_m = self.ground.site.rectangle_m[(side + 2) % 4]
+        ends_m = [sign * (border_m - rear_m)]
+        for box in (*self._standing_m, *(held.rectangle for held in self.held)):
+            beside_m = max(box[1 - axis] - at_m, at_m - box[3 - axis])
+            near_m, far_m = sorted(sign * (box[axis + k] - rear_m) for k in (0, 2))
+            if beside_m < radius_m - _SAME_M and far_m > _SAME_M:
+                ends_m.append(near_m)
+        room_m = min(ends_m) - radius_m
+        # 2. Places every half metre, and the farthest one; a charge keeps clear of the piece.
+        most_m = min(max(piece.rating.penetration_m, radius_m), room_m)
+        steps_m = np.append(np.arange(radius_m, most_m, MODULE_SIDE_M), most_m)
+        places = np.full((len(steps_m), 2), at_m)
+        places[:, axis] = rear_m + sign * steps_m
+        return places[[most_m >= radius_m - _SAME_M and self._is_clear(spot) for spot in places]]
+
+    @property
+    def _standing_m(self) -> tuple[Rectangle, ...]:
+        """What stops a load: structures, gates, and pieces without a rating."""
+        return (*self.ground.standing_m, *self.ground.gates, *self.obstacles.stops)
+
+    def _is_clear(self, place: FloatArray) -> bool:
+        """Return whether a charge fits at a place: on the site, and in no piece."""
         x, y = place.tolist()
-        around = Rectangle(x, y, x, y).grown(radius_m)
+        around = Rectangle(x, y, x, y).grown(self.ground.charge_radius_m)
         inside = self.ground.site.rectangle_m.contains(around)
-        return inside and not any(around.overlaps(element) for element in standing)
+        pieces_m = [piece.rectangle for piece in (*self.held, *self.broken)]
+        standing_m = (*self._standing_m, *self.obstacles.solid, *pieces_m)
+        return inside and not any(around.overlaps(box) for box in standing_m)
 
 
 @lru_cache(maxsize=64)
@@ -257,7 +288,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     held = (*obstacles.rated, *ground.rated_gates)
     broken: tuple[CrashPiece, ...] = ()
     if motion is None:
-        return Drive(ground, _reach(ground, obstacles, held, broken), held, broken)
+        return Drive(ground, obstacles, _reach(ground, obstacles, held, broken), held, broken)
     # 1. Too light a rating for the mass: the piece breaks at any speed.
     broken = tuple(
         rated_piece for rated_piece in held if rated_piece.rating.mass_kg < motion.mass_kg
@@ -281,7 +312,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
             weak = _too_slow(slow, _free_speeds(ground), is_open)
             weak = weak and _weak_on(ground, _as_bits(is_open), weak)
         if not weak:
-            return Drive(ground, reach, held, broken)
+            return Drive(ground, obstacles, reach, held, broken)
         broken = (*broken, *weak)
         held, slow = (tuple(item for item in those if item not in weak) for those in (held, slow))
 

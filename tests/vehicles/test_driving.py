@@ -306,6 +306,26 @@ def test_the_load_of_a_stopped_vehicle_gets_as_far_as_the_penetration() -> None:
         assert worst_stand_off_m(site) == pytest.approx(stand_off_m)
 
 
+def test_a_load_that_has_less_room_than_its_penetration_goes_up_to_what_stands() -> None:
+    # From the posts to the hut are 5.5 m. A charge of 0.5 m radius lies against it at most.
+    stand_offs_m = [
+        worst_stand_off_m(rated_site(code)) for code in ("C740/P1", "C740/P2", "C740/P3")
+    ]
+    assert stand_offs_m == pytest.approx([4.5, 0.5, 0.5])
+
+
+def test_a_load_comes_to_rest_before_a_wall_behind_the_piece() -> None:
+    road = ground(40.0, 6.0, (2.0, 4.0), [(0, 2, 40, 4)], entry_speed_km_h=30.0)
+    post = CrashPiece(
+        Rectangle(20.0, 2.0, 20.5, 4.0), CrashRating.model_validate("C740/P2"), "post"
+    )
+    wall = Rectangle(23.0, 0.0, 23.5, 6.0)
+    radius_m = road.charge_radius_m
+    for obstacles, last_m in (((), 27.5), ((wall,), 23.0 - radius_m)):
+        places_m = road.drive(Obstacles(stops=obstacles, rated=(post,))).places_m
+        assert places_m[:, 0].max() == pytest.approx(last_m)
+
+
 def test_without_a_speed_ratings_are_not_heeded() -> None:
     site = rated_site("V/7200[N2A]/32/90:0.0")
     assert worst_stand_off_m(site) == pytest.approx(1.0)
