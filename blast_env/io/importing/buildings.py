@@ -71,10 +71,12 @@ def prepared(site: SitePlacement) -> SitePlacement:
     """Return a site whose buildings have sound outlines and heights, and do not overlap."""
     others = [thing for thing in site.things if thing.role is not Role.BUILDING]
     buildings = [_sound(site, thing) for thing in site.of_role(Role.BUILDING)]
-    buildings = without_doubles(buildings, site.ledger)
-    buildings = on_the_ground(buildings, site.options.level_height_m, site.ledger)
-    buildings = _with_heights(site, _with_parts(site, buildings))
-    return replace(site, things=(*others, *_apart(site, buildings)))
+    single = without_doubles(buildings, site.ledger)
+    buildings = on_the_ground(single, site.options.level_height_m, site.ledger)
+    buildings = _apart(site, _with_heights(site, _with_parts(site, buildings)))
+    left = {building.place for building in buildings}
+    gone = [building for building in single if building.place not in left]
+    return replace(site, things=(*others, *buildings), faulty=(*site.faulty, *gone))
 
 
 def _sound(site: SitePlacement, thing: Thing) -> Thing:
@@ -107,6 +109,7 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     wholes = [thing for thing in things if not thing.is_part]
     tree = shapely.STRtree([whole.geometry for whole in wholes])
     parts: dict[int, list[Thing]] = {}
+    marked = {k for k, whole in enumerate(wholes) if whole.protected}
     found = []
     for part in things:
         if not part.is_part:
@@ -115,7 +118,9 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
         own = _building_of(part, wholes, tree) if own is None else own
         if own is None:
             found.append(replace(part, is_part=False))
-        elif part.height_m is None or part.geometry.area < site.options.least_area_m2:
+            continue
+        marked |= {own} if part.protected else set()
+        if part.height_m is None or part.geometry.area < site.options.least_area_m2:
             kind = "parts of buildings, small or without a height"
             site.ledger.add(Fate.MERGED, kind, part.place, part.name, f"with {wholes[own].place}")
         else:
@@ -130,13 +135,11 @@ def _with_parts(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
             kind, detail = "heights of buildings with parts", f"{lowest_m:g} m, as the lowest"
             site.ledger.add(Fate.GUESSED, kind, whole.place, whole.name, detail)
             whole = replace(whole, height_m=lowest_m)
-        group = whole.part_of or (whole.place if own_parts else "")
-        found.append(replace(whole, part_of=group))
+        group, is_marked = whole.part_of or (whole.place if own_parts else ""), index in marked
+        found.append(replace(whole, part_of=group, protected=is_marked))
         found += [
-            replace(
-                own_part, part_of=group, protected=whole.protected, name=own_part.name or whole.name
-            )
-            for own_part in own_parts
+            replace(own, part_of=group, protected=is_marked, name=own.name or whole.name)
+            for own in own_parts
         ]
     return found
 
@@ -161,20 +164,37 @@ def _common(one: Thing, other: Thing) -> BaseGeometry:
 def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     """Return buildings without overlaps: the higher one has the ground of both.
 
-    A part comes before its building. A higher building that begins above the lower one's base
-    begins there where they overlap.
+    A part has the ground of its own building, whatever its height, and that of others where it is
+    higher.
     """
-    order = sorted(
-        (thing for thing in things if not thing.carries),
-        key=lambda building: (
-            -bool(building.is_part),
-            -(building.height_m or 0.0),
-            -building.geometry.area,
-        ),
-    )
-    # From the first of the order on, each keeps its ground, and those after it lose what it covers.
+    groups: dict[str, list[Thing]] = {}
+    found: list[Thing] = []
+    left: list[Thing] = []
+    for thing in things:
+        if thing.carries:
+            found.append(thing)
+        elif thing.part_of:
+            groups.setdefault(thing.part_of, []).append(thing)
+        else:
+            left.append(thing)
+    # 1. Each building less its own parts; 2. all less what is higher.
+    for group in groups.values():
+        left += _cut(site, sorted(group, key=lambda own: (-own.is_part, *_highest_first(own))))
+    return [*found, *_cut(site, sorted(left, key=_highest_first))]
+
+
+def _highest_first(building: Thing) -> tuple[float, float]:
+    return -(building.height_m or 0.0), -float(building.geometry.area)
+
+
+def _cut(site: SitePlacement, order: Sequence[Thing]) -> list[Thing]:
+    """Return buildings, each less the ground of those before it.
+
+    A building that begins above the base of the one below it begins there where they overlap.
+    """
+    # Each keeps its ground, and those after it lose what it covers.
     tree = shapely.STRtree([building.geometry for building in order])
-    found = [thing for thing in things if thing.carries]
+    found: list[Thing] = []
     left = list(order)
     for k, thing in enumerate(order):
         shape = thing.geometry
@@ -188,7 +208,8 @@ def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
                 shape = areas_of(shapely.difference(shape, order[index].geometry))
                 found += _filled(thing, order[index], left, index)
         if cut:
-            kind = "parts above their building" if cut[0].is_part else "buildings over buildings"
+            is_own = cut[0].is_part and _are_related(thing, cut[0])
+            kind = "parts above their building" if is_own else "buildings over buildings"
             detail = f"by {', '.join(part.place for part in cut)}"
             fate, outcome = Fate.CUT, "overlap left out"
             if shape.area < least_m2:
@@ -198,11 +219,15 @@ def _apart(site: SitePlacement, things: Sequence[Thing]) -> list[Thing]:
     return [*found, *(building for building in left if not building.geometry.is_empty)]
 
 
+def _are_related(one: Thing, other: Thing) -> bool:
+    """Return whether two are parts of one building."""
+    return bool(one.part_of) and one.part_of == other.part_of
+
+
 def _overlap(one: Thing, other: Thing) -> bool:
     """Return whether two buildings overlap by more than the inaccuracy of a map."""
     least = min(one.geometry.area, other.geometry.area)
-    related = bool(one.part_of) and one.part_of == other.part_of
-    share = 0.0 if related else _LEAST_SHARE
+    share = 0.0 if _are_related(one, other) else _LEAST_SHARE
     return bool(_common(one, other).area > max(share * least, _LEAST_M2))
 
 

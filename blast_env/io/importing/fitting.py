@@ -1,7 +1,7 @@
 """The buildings of a site as polygons: their names, deviations and protection."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -31,6 +31,8 @@ MOST_TITLE: Final = 100
 
 _MOST_NAME: Final = 34  # characters, which leaves room for the letters of parts
 _BARRIER: Final = "barrier"
+_CUT: Final = "buildings across the border of the site, with a wall there that they do not have"
+_LEAST_CUT_M2: Final = 0.5 * MODULE_SIDE_M**2
 _DIGITS: Final = (3, 6)  # of coordinates; more where millimetres make modules overlap
 _JOINED_M: Final = 0.05  # gap between buildings that is closed
 _MUCH_AREA: Final = 0.2
@@ -232,11 +234,20 @@ def _kept(site: SitePlacement) -> list[Thing]:
             detail = f"{area.area:.1f} m2 on the site"
             site.ledger.add(Fate.LEFT_OUT, kind, thing.place, thing.name, detail)
         else:
+            _note_cut(site, thing, area)
             kept.append((replace(thing, geometry=area), outline))
     if len(kept) > MOST_STRUCTURES:
         raise _too_many(site, f"there are {len(kept)} buildings on the site, must be")
     check_outlines([thing.geometry for thing, _ in kept], f"{site.path}: the buildings")
     return [replace(thing, name=thing.name or _written_in(site, whole)) for thing, whole in kept]
+
+
+def _note_cut(site: SitePlacement, thing: Thing, area: BaseGeometry) -> None:
+    """Enter a building of which the border of the site leaves a part."""
+    whole_m2 = thing.geometry.area
+    if whole_m2 - area.area > _LEAST_CUT_M2:
+        detail = f"{area.area:.1f} of {whole_m2:.1f} m2"
+        site.ledger.add(Fate.CUT, _CUT, thing.place, thing.name, detail)
 
 
 def _too_many(site: SitePlacement, what: str) -> BlastEnvError:
@@ -354,10 +365,12 @@ def _with_protected(
 
     All parts of a building are protected with it.
     """
-    chosen = {_named(site, buildings, name) for name in site.options.protect}
+    chosen = {index for name in site.options.protect for index in _named(site, buildings, name)}
     if site.options.protect_near is not None:
         chosen.add(_nearest(site, buildings, site.options.protect_near))
     if not chosen:
+        known = {place for building in buildings for place in (building.place, building.group)}
+        _check_marked(site, known)
         chosen = {index for index, building in enumerate(buildings) if building.protected}
     if not chosen:
         raise BlastEnvError(
@@ -368,13 +381,36 @@ def _with_protected(
     return tuple(replace(building, protected=building.group in groups) for building in buildings)
 
 
-def _named(site: SitePlacement, buildings: Sequence[BuildingFit], name: str) -> int:
-    """Return the index of the building of a name, the scenario's or the map's."""
+def _check_marked(site: SitePlacement, known: Set[str]) -> None:
+    """Refuse a file that marks a building on the site as protected which is not kept.
+
+    Args:
+        known: Places in the file of the buildings that are, and of those of which parts are.
+    """
+    fates = {entry.place: entry for entry in site.ledger.of(Fate.LEFT_OUT, Fate.MERGED)}
+    for thing in (*site.of_role(Role.BUILDING), *site.faulty):
+        entry = fates.get(thing.place)
+        if thing.protected and entry is not None and thing.place not in known:
+            raise BlastEnvError(
+                f"{site.path}: marks a building as protected that is {entry.fate}: {entry.kind}: "
+                f"{entry.words}; with --protect or --protect-near no mark counts"
+            )
+
+
+def _named(site: SitePlacement, buildings: Sequence[BuildingFit], name: str) -> list[int]:
+    """Return the indices of the buildings of a name, the map's or the scenario's.
+
+    A map may have a name several times, as that of a school of several houses.
+    """
     asked = shortened(name, MOST_TITLE).casefold()
-    for key in ("name", "title"):
-        for index, building in enumerate(buildings):
-            if getattr(building, key).casefold() == asked:
-                return index
+    for key in ("title", "name"):
+        found = [
+            index
+            for index, building in enumerate(buildings)
+            if asked and getattr(building, key).casefold() == asked
+        ]
+        if found:
+            return found
     for lost in site.ledger.of(Fate.LEFT_OUT):
         if lost.name.casefold() == name.casefold():
             raise BlastEnvError(

@@ -44,7 +44,8 @@ class SitePlacement:
         corner_m: The site's lower left corner in the turned plane.
         shape: Rows and columns of modules.
         things: Objects on the site or near it.
-        faulty: Objects on the site or of an unknown place that cannot be used.
+        faulty: Objects on the site or of an unknown place that cannot be used, and buildings that
+            are below the ground or part of others.
         layers: Layers of a drawing.
     """
 

@@ -11,6 +11,7 @@ import pytest
 import shapely
 from pyproj import Transformer
 
+from blast_env.errors import BlastEnvError
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.importing import Fate, ImportOptions, Role, SiteImport, import_site
 from blast_env.layout import usable_cells
@@ -270,6 +271,38 @@ def test_protected_is_what_is_named_near_or_marked(tmp_path: Path) -> None:
     assert protected(protect=("Strasse_5",), protect_near=(0, 0)) == ["Nord_Schule", "Strasse_5"]
 
 
+def test_all_houses_of_a_name_are_protected(tmp_path: Path) -> None:
+    blocks = [outline(rectangle(x, 0, 6, 4), name="School") for x in (0, 10)]
+    hall = outline(rectangle(20, 0, 6, 4), name="Hall")
+    site = imported(written(tmp_path, *blocks, hall, charge(8.0, 12.0)), protect=("School",))
+    marks = {building.place: building.protected for building in site.buildings}
+    assert marks == {"features[0]": True, "features[1]": True, "features[2]": False}
+
+
+def test_a_marked_building_that_is_lost_is_refused_not_dropped(tmp_path: Path) -> None:
+    """Another building with a mark would count alone, without a word."""
+    own = outline(rectangle(20, 0, 6, 4), name="Hall", protected="yes")
+    hidden = outline(rectangle(0, 0, 6, 4), name="Post", protected="yes", height=3.0)
+    above = outline(rectangle(-1, -1, 9, 9), name="Shed", height=9.0)
+    path = written(tmp_path, own, hidden, above, charge(8.0, 12.0))
+    with pytest.raises(BlastEnvError, match=r"protected that is merged: .* 'Post': by features"):
+        import_site(path)
+    small = outline(rectangle(0, 0, 1, 1), name="Box", protected="yes")
+    path = written(tmp_path, own, small, charge(8.0, 12.0))
+    with pytest.raises(BlastEnvError, match=r"protected that is left out: .* 'Box'"):
+        import_site(path)
+    hall, *_ = (building for building in imported(path, protect=("Hall",)).buildings)
+    assert hall.protected
+
+
+def test_the_mark_of_a_part_protects_its_building(tmp_path: Path) -> None:
+    whole = outline(rectangle(0, 0, 20, 10), name="Hall", height=6.0)
+    part = {"building": "no", "building:part": "yes", "height": 12.0, "protected": "yes"}
+    wing = outline(rectangle(0, 0, 10, 10), **part)
+    site = imported(written(tmp_path, whole, wing, charge(8.0, 22.0)))
+    assert [building.protected for building in site.buildings] == [True, True]
+
+
 def test_properties_say_what_is_what_where_the_user_says_which(tmp_path: Path) -> None:
     path = written(
         tmp_path,
@@ -402,7 +435,9 @@ def test_a_building_that_the_border_cuts_apart_has_two_structures(tmp_path: Path
         tmp_path, outline([(float(x), float(y)) for x, y in ring], name="U", protected=True)
     )
     options = {"origin": (-8.0, 4.0), "size_m": (26.0, 12.0), "rotation_deg": 0.0}
-    scenario = imported(path, charge_at=((-5.0, 10.0),), **options).scenario
+    site = imported(path, charge_at=((-5.0, 10.0),), **options)
+    assert [entry.detail for entry in site.ledger.of(Fate.CUT)] == ["32.0 of 76.0 m2"]
+    scenario = site.scenario
     assert [structure.name for structure in scenario.structures] == ["Ua", "Ub"] or [
         structure.name for structure in scenario.structures
     ] == ["U_a", "U_b"]

@@ -489,6 +489,22 @@ def test_a_part_beyond_its_building_is_whole(tmp_path: Path) -> None:
     assert areas == {"features[0]": 200.0, "features[2]": 170.0, "features[3]": 48.0}
 
 
+def test_a_tower_on_a_building_of_parts_stands(tmp_path: Path) -> None:
+    """It is no part of the building, whose own parts are lower: it had been lost in them."""
+    part = {"building": "no", "building:part": "yes"}
+    podium = outline(rectangle(30, 0, 20, 10), **part, height=6.0)
+    tower = outline(rectangle(34, 2, 6, 6), name="Tower", height=40.0)
+    tops = {
+        building.place: (building.height_m, building.outline.area)
+        for building in of_map(tmp_path, beside(), podium, tower).buildings
+    }
+    assert tops == {
+        "features[0]": (6.0, 200.0),
+        "features[3]": (6.0, 200.0 - 36.0),
+        "features[4]": (40.0, 36.0),
+    }
+
+
 # Extracts.
 
 
