@@ -249,7 +249,7 @@ class BlastEvaluator:
             engine=engine_text(self.engine),
             calibration="" if law is None else law.digest,
             code=code_version(),
-            parts=parts_digest(self.scenario),
+            parts=parts_digest(self.scenario, self.engine.response_s(self.scenario)),
         )
 
     def coarser(self) -> "BlastEvaluator | None":

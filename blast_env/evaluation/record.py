@@ -382,12 +382,16 @@ KEY: Final = TypeAdapter(BlastKey)
 """Reads a key from its text."""
 
 
-def parts_digest(scenario: Scenario) -> str:
+def parts_digest(scenario: Scenario, response_s: float = 0.0) -> str:
     """Return the digest of what a record depends on beside its loads; empty for a plain site.
 
-    These are the buildings of structures, the bays of facades, and the masses of barrier items. The
-    panes and walls in the bays are no part of it, nor are measures that replace them: their
-    response is computed from the histories.
+    These are the buildings of structures, the bays of facades, the masses of barrier items, and how
+    long histories go on. The panes and walls in the bays are no other part of it, nor are measures
+    that replace them: their response is computed from the histories.
+
+    Args:
+        scenario: The site.
+        response_s: See `Engine.response_s`.
     """
     # Masses decide which pieces fall in a blast; names, divisions and bays of facades decide what
     # is recorded.
@@ -400,7 +404,9 @@ def parts_digest(scenario: Scenario) -> str:
     ]
     if not (items or structures):
         return ""
-    return sha256(json.dumps((items, structures)).encode()).hexdigest()
+    # A slower component needs longer histories, and a longer run may find larger loads.
+    longer = (response_s,) if response_s else ()
+    return sha256(json.dumps((items, structures, *longer)).encode()).hexdigest()
 
 
 def _division(structure: AnyStructure) -> tuple[object, ...] | None:

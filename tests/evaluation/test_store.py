@@ -558,3 +558,19 @@ def test_walls_of_a_polygon_that_get_windows_later_have_a_verdict_too(tmp_path: 
         return set(tables(consequences(evaluator, (), [CHARGE]))[0]["wall"])
 
     assert (walls(1), walls(2), walls(1)) == ({"east"}, {"east", "west"}, {"east"})
+
+
+def test_a_slower_wall_does_not_respond_to_the_short_histories_of_a_faster_one(
+    tmp_path: Path,
+) -> None:
+    """A run goes on for a period of the slowest component: kept histories may end too early."""
+
+    def walls(wall: str, folder: str) -> pd.DataFrame:
+        document = glazed_hut().model_dump(mode="json", exclude_none=True)
+        document["structures"][0]["facade"] = {"bay_m": 1.0, "wall": wall}
+        evaluator = on_gas(tmp_path / folder, Scenario.from_document(document, "walled_hut"))
+        return tables(consequences(evaluator, (), [CHARGE]))[0]
+
+    fast = walls("concrete_200", "cache")
+    pd.testing.assert_frame_equal(walls("steel_stud", "cache"), walls("steel_stud", "other"))
+    pd.testing.assert_frame_equal(walls("concrete_200", "cache"), fast)

@@ -195,6 +195,10 @@ class Engine(ABC):
         """Return whether the loads on a site have overpressures."""
         return self.has_peaks
 
+    def response_s(self, scenario: Scenario) -> float:  # noqa: ARG002
+        """Return how long a blast goes on for the response of facades, s; 0 if it does not."""
+        return 0.0
+
     def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002
         """Return the calibration that converts its impulses to Pa s; `None` if it needs none."""
         return None

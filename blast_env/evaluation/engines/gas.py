@@ -83,20 +83,6 @@ _WIDEST_UNIFORM_M: Final = 40.0
 """Side of the cells of final statements, and the widest site on which they do not grow."""
 
 
-def response_time_s(scenario: Scenario) -> float:
-    """Return the natural period of the slowest component of the facades of a site, s.
-
-    In a period a loaded component swings in and rebounds. Components that hardening may install
-    are included.
-    """
-    hardened = (
-        bay
-        for alternative in scenario.alternatives
-        for bay in (*alternative.glazing.values(), *alternative.wall.values())
-    )
-    return slowest_period_s([*scenario.bays, *hardened])
-
-
 @dataclass(frozen=True)
 class GasEngine(GasSettings, Engine):
     """Computes blasts in a compressible gas, in compiled code; for settings see `GasSettings`."""
@@ -120,6 +106,19 @@ class GasEngine(GasSettings, Engine):
     ) -> "GasBlast":
         """Return one blast, for running and inspection."""
         return GasBlast(find_scenario(scenario), layout, seed, self, charge)
+
+    def response_s(self, scenario: Scenario) -> float:
+        """Return the natural period of the slowest component of the facades of a site, s.
+
+        In a period a loaded component swings in and rebounds. Components that hardening may install
+        are included.
+        """
+        hardened = (
+            bay
+            for alternative in scenario.alternatives
+            for bay in (*alternative.glazing.values(), *alternative.wall.values())
+        )
+        return slowest_period_s([*scenario.bays, *hardened])
 
     def record(
         self,
@@ -145,7 +144,7 @@ class GasEngine(GasSettings, Engine):
             structures=outlines(scenario),
             air_height_m=scenario.air_height_m,
         )
-        return cost_of_run(self, site, response_time_s(scenario))
+        return cost_of_run(self, site, self.response_s(scenario))
 
     def final(self, scenarios: Sequence[Scenario]) -> "GasEngine":
         """Return the engine with cells of 0.25 m, which grow if a site is wider than 40 m."""
@@ -202,7 +201,7 @@ class GasBlast(RunnableBlast):
         """
         from blast_env.gas.engine import GasRun  # Numba takes half a second to import
 
-        run = GasRun(self.engine, self.site, recorders, response_time_s(self.scenario))
+        run = GasRun(self.engine, self.site, recorders, self.engine.response_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
         bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
         if bays.bays:
