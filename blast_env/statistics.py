@@ -204,10 +204,10 @@ def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
 
 
 def mean_over_area(load: FloatArray, area: FloatArray) -> float:
-    """Return the area-weighted mean load of a wall, structure or building; NaN without parts.
+    """Return the area-weighted mean load of a wall, structure or building; NaN without any area.
 
     Args:
         load: Loads on its parts (n,).
         area: Their areas, in any unit (n,).
     """
-    return float(np.average(load, weights=area)) if len(load) else np.nan
+    return float(np.average(load, weights=area)) if area.any() else np.nan

@@ -47,7 +47,8 @@ class StructureLoad:
         weight: Its weight among the protected structures.
         impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
             dynamics the peak specific impulse, averaged over the counted walls.
-        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
+        peak_pa: Largest overpressure on its walls, Pa; NaN if no air touches them, `None` for
+            particles, which have none.
         peak_weight: Weight of the peak among the protected structures.
         in_range: Whether this distance and charge lie in the range of the calibration.
         notes: Reasons if they do not, one sentence each.
@@ -297,18 +298,26 @@ class BlastLoads:
 
     @property
     def protected_peak_pa(self) -> float:
-        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
-        peaks = [load.peak_pa for load in self.protected]
-        return max([np.nan if peak is None else peak for peak in peaks], default=0.0)
+        """The largest overpressure on any wall of a protected building, Pa.
+
+        NaN for particles, and if no air touches the walls of one of them, as of the impulse.
+        """
+        peaks = [load.peak_pa for load in self._buildings]
+        if None in peaks or self.without_load:
+            return np.nan
+        return max([peak for peak in peaks if peak is not None], default=0.0)
 
     def load(self, objective: ObjectiveSection) -> float:
         """Return the load of the protected structures that an objective selects, in its unit."""
+        # A building without a load has no peak either. A part of another one counts as 0.
+        if objective.quantity == "peak" and self.without_load:
+            return np.nan
         impulse_pa_s = {building.name: building.impulse_pa_s for building in self._buildings}
         return sum(
             [
                 objective.load(
                     impulse_pa_s[load.building],
-                    load.peak_pa or 0.0,
+                    0.0 if load.area_m2 == 0.0 else load.peak_pa or 0.0,
                     load.weight,
                     load.peak_weight,
                     load.response,

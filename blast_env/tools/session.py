@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as WaitedTooLong
 from functools import cached_property, partial
-from math import isnan
 from pathlib import Path
 from threading import RLock
 from time import monotonic
@@ -33,6 +32,7 @@ from blast_env.layout.placement import load_relevant
 from blast_env.rules import random_layout
 from blast_env.sections import digest_of
 from blast_env.surrogate import Surrogate, SurrogateSite, packaged_surrogate, site_of
+from blast_env.tables import number_or_none
 from blast_env.tools.guesses import guessed_shares
 from blast_env.tools.records import (
     BUDGET,
@@ -352,8 +352,8 @@ class Session:
             BuildingLoad(
                 threat=number,
                 building=load.name,
-                impulse_pa_s=None if isnan(load.impulse_pa_s) else load.impulse_pa_s,
-                peak_pa=load.peak_pa,
+                impulse_pa_s=number_or_none(load.impulse_pa_s),
+                peak_pa=None if load.peak_pa is None else number_or_none(load.peak_pa),
                 validity=load.validation.words,
             )
             for number, of_threat in enumerate(loads)

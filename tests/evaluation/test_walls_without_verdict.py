@@ -189,6 +189,29 @@ def test_the_response_of_a_hidden_building_is_no_number_as_is_its_load(cache: Pa
         evaluate_layout(hidden, (), threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
 
 
+def test_the_peak_of_a_hidden_building_is_no_number_as_is_its_load(cache: Path) -> None:
+    """It was 0, so that a layout that hides the building was the best one."""
+    peak: dict[str, Any] = {"objective": {"kind": "load", "quantity": "peak"}}
+    threats = [LoadCase(CHARGE)]
+    for others in (("other",), ("other", "house")):
+        scenario = site(*others, **peak)
+        found = evaluate_layout(scenario, WALLS, threats=threats, engine=ENGINE, cache=cache)
+        assert np.isnan([found.load, found.mean_reduction, found.worst.peak_pa]).all()
+        assert found.unprotected_load > 0.0
+        assert np.isnan(found.table.set_index("structure")["peak_pa"]["front"])
+    with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front: no air"):
+        evaluate_layout(site("porch", "house", **peak), (), threats=threats, engine=ENGINE)
+    part = evaluate_layout(site("annex", **peak), (), threats=threats, engine=ENGINE)
+    assert part.load == part.building_table["peak_pa"].item() > 0.0
+
+
+def test_a_building_of_parts_that_are_all_hidden_has_no_load_either(cache: Path) -> None:
+    """The mean over its walls, which are none, had been an error of Python."""
+    scenario = site("annex", "porch")
+    with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front: no air"):
+        evaluate_layout(scenario, (), threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)
+
+
 def test_json_has_null_where_pieces_hide_a_building(tmp_path: Path, cache: Path) -> None:
     scenario = site("other")
     found = evaluate_layout(scenario, WALLS, threats=[LoadCase(CHARGE)], engine=ENGINE, cache=cache)

@@ -448,7 +448,7 @@ class GasResult:
             StructureLoad.on(
                 named[outline.name],
                 scaled.pa_s,
-                float(self._peak_pa[self._walls(index)].max(initial=0.0)),
+                self._largest_pa(index),
                 scaled.in_range,
                 notes=scaled.notes,
                 area_m2=self._area_m2(index),
@@ -522,6 +522,11 @@ class GasResult:
         own = self._walls(index)
         along = values if self.oblique is None else self.oblique.along_normals(values)
         return mean_over_area(along[own], self._share[own])
+
+    def _largest_pa(self, index: int) -> float:
+        """Return the largest peak on the counted walls of a structure; NaN without any."""
+        own_pa = self._peak_pa[self._walls(index)]
+        return float(own_pa.max()) if len(own_pa) else np.nan
 
     def _scaled(self, index: int) -> ScaledImpulse:
         """Return the impulse on a structure, by its index in the site."""
