@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self
 import numpy as np
 from pydantic import Field, StrictFloat, ValidationError, model_validator
 
+from blast_env.arrays import FloatArray
 from blast_env.documents import described
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import TOLERANCE_M
@@ -158,6 +159,10 @@ class PointSource(ChargeSource):
         """The point as a line without a length."""
         return ((self.position_m, self.position_m),)
 
+    def nearest_m(self, points_m: FloatArray) -> FloatArray:
+        """Return its place nearest to each of some points (points, 2)."""
+        return np.broadcast_to(np.array(self.position_m), points_m.shape)
+
     def has_place(self, position_m: PointM) -> bool:
         """Return whether it is the point."""
         return position_m == self.position_m
@@ -184,6 +189,12 @@ class SegmentSource(ChargeSource):
         """The lines of the charge's places."""
         return ((self.start_m, self.end_m),)
 
+    def nearest_m(self, points_m: FloatArray) -> FloatArray:
+        """Return its place nearest to each of some points (points, 2)."""
+        start_m, way_m = np.array(self.start_m), np.subtract(self.end_m, self.start_m)
+        shares = (points_m - start_m) @ way_m / max(float(way_m @ way_m), TOLERANCE_M**2)
+        return np.asarray(start_m + shares.clip(0.0, 1.0)[:, np.newaxis] * way_m)
+
     def has_place(self, position_m: PointM) -> bool:
         """Return whether the segment has a point, but for rounding."""
         (x_m, y_m), (x0, y0), (x1, y1) = position_m, self.start_m, self.end_m
@@ -206,6 +217,11 @@ class RectangleSource(ChargeSource, Ground):
     """A charge uniformly distributed in a rectangle: a parking area."""
 
     kind: Literal["rectangle"]
+
+    def nearest_m(self, points_m: FloatArray) -> FloatArray:
+        """Return its place nearest to each of some points (points, 2)."""
+        left, bottom, right, top = self.rectangle_m
+        return points_m.clip((left, bottom), (right, top))
 
     def has_place(self, position_m: PointM) -> bool:
         """Return whether the rectangle has a point, but for rounding."""

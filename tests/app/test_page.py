@@ -32,12 +32,13 @@ from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading
-from blast_env.site import Scenario, load_scenario, save_scenario
+from blast_env.site import Scenario, bundled_scenarios, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.builders import block
 from tests.gas_sites import WALL, glazed_hut, hut
 from tests.io.importing.maps import BLOCK
 from tests.test_terraces import TERRACE, terraced
+from tests.vehicle_sites import gate_site
 
 Story = Callable[[User, Sessions], Awaitable[None]]
 
@@ -300,6 +301,31 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         assert session.scenario.structures[0].facade is None
 
     play(tmp_path, story)
+
+
+def test_a_vehicle_has_fields_of_its_own(tmp_path: Path) -> None:
+    """The fields of the site had stayed, and what was typed from then on had changed nothing."""
+
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, gate_site())
+        choose_thing(user, "charge 0")
+        width = field_of(user, "width of the vehicle (m)")
+        assert width.value == "2"
+        width.value = "2.5"
+        user.find("width of the vehicle (m)").trigger("blur")
+        (vehicle,) = session.scenario.vehicles
+        assert vehicle.width_m == 2.5
+        assert session.scenario.site.width_m == 14.0
+
+    play(tmp_path, story)
+
+
+@pytest.mark.parametrize("name", bundled_scenarios())
+def test_each_charge_of_a_site_has_fields(name: str) -> None:
+    site = load_scenario(name)
+    for number in range(len(site.charge)):
+        fields = fields_of(site, SiteThing(ThingKind.CHARGE, number))
+        assert len({field.label for field in fields}) == len(fields) > 4
 
 
 def test_panels_of_one_side_are_chosen_in_the_fields(tmp_path: Path) -> None:

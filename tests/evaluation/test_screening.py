@@ -113,6 +113,24 @@ def test_the_nearest_place_of_a_line_is_the_worst() -> None:
     assert found.places > 10
 
 
+@pytest.mark.parametrize("place_m", [103.0, 97.0])
+def test_the_nearest_place_of_a_wide_area_or_a_long_street_is_among_its_places(
+    place_m: float,
+) -> None:
+    """Steps of 17 m passed the hut by: peaks were 1.7 times too low."""
+    facade = {"storeys": 2, "bay_m": 2.5, "glazing": "window_annealed_6"}
+    target = builders.block(
+        "hut", place_m, 40.0, 20, 20, height_m=6.0, protected=True, facade=facade
+    )
+    area = {"kind": "rectangle", "corner_m": [10.0, 4.0], "size_m": [200.0, 30.0], "tnt_kg": 20.0}
+    way = {"kind": "segment", "start_m": [10.0, 34.0], "end_m": [210.0, 34.0], "tnt_kg": 20.0}
+    for sources in ([area], [way] * 20):
+        (threat,) = screen(builders.site("s", (220.0, 60.0), sources, target)).threats
+        middle_m = builders.point(place_m + 5.0 - 1.25, 34.0, 20.0)
+        (near,) = screen(builders.site("s", (220.0, 60.0), middle_m, target)).threats
+        assert threat.nearest_m == pytest.approx(near.nearest_m, abs=1e-6)
+
+
 def test_a_component_keeps_its_level_from_its_stand_off_on() -> None:
     pane = catalogue()["window_annealed_6"]
     (glass,) = stand_offs({"w": pane}, Charge((0.0, 0.0), 5.0))

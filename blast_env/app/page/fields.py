@@ -109,6 +109,13 @@ _OF_CHARGE: Final[Mapping[str, tuple[FormField, ...]]] = {
         FormField("to y (m)", "end_m", part=1),
     ),
     "rectangle": (*_CORNER, *_SIZE),
+    "vehicle": (
+        FormField("width of the vehicle (m)", "width_m"),
+        FormField("places", "places", "integer", hint="the nearest places that count"),
+        FormField(
+            "places apart (m)", "apart_m", optional=True, hint="at least; else the vehicle's width"
+        ),
+    ),
 }
 
 _OF_STRUCTURE: Final = (

@@ -39,7 +39,7 @@ from blast_env.response.walls import Panel, panel_of
 from blast_env.sections import PointM
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.blast_site import BlastSite, Charge, in_sight
-from blast_env.site.sources import MassPreset
+from blast_env.site.sources import MassPreset, PlaceSource
 from blast_env.units import MODULE_SIDE_M
 
 LEFT_OUT: Final = (
@@ -70,6 +70,8 @@ BEHIND_LOW_BY: Final = 1.48
 
 _APART_M: Final = 2.0
 _MOST_PLACES: Final = 300
+_MOST_STEPS: Final = 12  # along a side of an area
+_MILLIMETRES: Final = 3  # digits
 _POINTS: Final = 14  # of a table of damage, along each axis
 _SHARES: Final = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of the width and the height of a bay
 _DISTANCES: Final = 400  # of stand-offs, each 0.8 % farther than the last
@@ -290,7 +292,7 @@ def screen(
     screened = []
     known_places: dict[object, Ways] = {}  # threats that differ in mass alone share them
     for name, own in sources.items():
-        places = [*_places(scenario, own, layout)]
+        places = [*_places(scenario, own, layout, facade)]
         key = tuple((place.position_m, place.height_m) for place in places)
         if key not in known_places:
             known_places[key] = facade.ways_from(places, by_sight=atlas is None)
@@ -581,9 +583,12 @@ def _named_sources(
 
 
 def _places(
-    scenario: Scenario, sources: Sequence[AnySource], layout: Sequence[Element]
+    scenario: Scenario, sources: Sequence[AnySource], layout: Sequence[Element], facade: _Facade
 ) -> Iterator[Charge]:
-    """Yield the places of a threat, at most `_APART_M` apart if they are not too many."""
+    """Yield the places of a threat, at most `_APART_M` apart if they are not too many.
+
+    Where they are farther apart, those nearest to each wall are among them.
+    """
     lengths_m = [hypot(*(b - a for a, b in zip(*_span(own), strict=True))) for own in sources]
     apart_m = max(_APART_M, sum(lengths_m) / _MOST_PLACES)
     for source, length_m in zip(sources, lengths_m, strict=True):
@@ -591,12 +596,26 @@ def _places(
         if isinstance(source, VehicleSource):
             points = worst_places(scenario, source, layout).places_m
         elif isinstance(source, RectangleSource):
-            points = _grid(source, apart_m)
+            is_coarse = max(source.size_m) > _MOST_STEPS * _APART_M
+            points = _grid(source, apart_m) + (_nearest(source, facade) if is_coarse else [])
         else:
             (x0, y0), (x1, y1) = _span(source)
             shares = np.linspace(0.0, 1.0, ceil(length_m / apart_m) + 1)
             points = [(x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares]
+            points += _nearest(source, facade) if apart_m > _APART_M else []
         yield from (Charge((float(x), float(y)), source.tnt_kg, source.height_m) for x, y in points)
+
+
+def _nearest(source: PlaceSource, facade: _Facade) -> list[PointM]:
+    """Return the place of a source nearest to each wall, before its middle if there are several."""
+    places_m = source.nearest_m(facade.middles_m[:, :2])
+    away_m = np.hypot(*(places_m - facade.middles_m[:, :2]).T).round(_MILLIMETRES)
+    off_middle_m = np.abs(np.diff(facade.ends_m, axis=1)[:, 0])
+    found: dict[object, int] = {}
+    for index in np.lexsort((off_middle_m, away_m)).tolist():
+        bay = facade.bays[index].bay
+        found.setdefault((bay.structure, bay.wall, bay.line_number), index)
+    return [(x_m, y_m) for x_m, y_m in places_m[[*found.values()]].tolist()]
 
 
 def _span(source: AnySource) -> tuple[PointM, PointM]:
@@ -608,7 +627,7 @@ def _span(source: AnySource) -> tuple[PointM, PointM]:
 def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
     left, bottom, right, top = source.rectangle_m
     x_m, y_m = (
-        np.linspace(low, high, min(ceil((high - low) / apart_m), 12) + 1)
+        np.linspace(low, high, min(ceil((high - low) / apart_m), _MOST_STEPS) + 1)
         for low, high in ((left, right), (bottom, top))
     )
     return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
