@@ -1,7 +1,9 @@
 """The methods of the package on the problems of the benchmark."""
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from hashlib import sha256
 from typing import Any, Final
 
 from blast_env.benchmark import (
@@ -27,11 +29,14 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.engines.contract import load_plugin
+from blast_env.files import read_regular
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
 
 RULES: Final = "rules"
 """In the place of the names of all rules that suit the sites."""
+
+_MOST_SOURCE_BYTES: Final = 100_000_000
 
 
 def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
@@ -73,6 +78,14 @@ def find_method(name: str) -> Method:
     if not callable(found):
         raise BlastEnvError(f"method is {value_text(name)}, must be something to call")
     return partial(_called, found, name)
+
+
+def source_digest(name: str) -> str:
+    """Return a digest of the file of a method `module:object`; empty for methods of the package."""
+    if ":" not in name:
+        return ""
+    file = getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
+    return "" if file is None else sha256(read_regular(file, _MOST_SOURCE_BYTES)).hexdigest()[:16]
 
 
 def _called(method: Callable[[Any, int], Any], name: str, problem: Any, seed: int) -> Layout:

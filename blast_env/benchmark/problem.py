@@ -8,7 +8,13 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.benchmark.definitions import BUDGETS, SEEDS, Definition, find_definition
+from blast_env.benchmark.definitions import (
+    BUDGETS,
+    DEFINITIONS,
+    SEEDS,
+    Definition,
+    find_definition,
+)
 from blast_env.benchmark.references import ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
 from blast_env.design.search import Candidate, DesignProblem
@@ -242,6 +248,11 @@ def make(
     definition = find_definition(problem) if isinstance(problem, str) else problem
     known = stored_references().get(definition.name)
     if known is not None and known.digest != definition.digest:
+        if definition.site != DEFINITIONS[definition.name].site:
+            raise BlastEnvError(
+                f"{definition.site}: {definition.name} is the name of a problem of the benchmark,"
+                " on another site: give the file another name"
+            )
         raise BlastEnvError(
             f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
             f"must be {known.digest}): a version never changes its content"

@@ -214,6 +214,7 @@ def play(
     asked: Iterable[tuple[Callable[[int], BenchmarkProblem], int, int]],
     store: Path | None = None,
     progress: Callable[[Run], None] | None = None,
+    identity: str = "",
 ) -> tuple[Run, ...]:
     """Run a method on problems.
 
@@ -224,6 +225,8 @@ def play(
         asked: Triples (function that makes the problem, budget, seed); see `RunGrid`.
         store: File in which each run is kept, a `Store`; runs that it has are not repeated.
         progress: Called with each run.
+        identity: What the layouts go by besides the problem, such as a digest of weights or of the
+            method's source: runs of another one are not taken from the store.
 
     Raises:
         BudgetError: If the budget does not pay for one evaluation.
@@ -233,7 +236,7 @@ def play(
     runs = []
     for make, budget, seed in asked:
         problem = make(budget)
-        key = json.dumps((problem.name, budget, seed))
+        key = json.dumps((problem.definition.digest, budget, seed, identity))
         run = None if kept is None else kept.read(key, _RUN.validate_json)
         if run is None:
             layout = tuple(sorted(check_layout(problem.scenario, _found(method, problem, seed))))

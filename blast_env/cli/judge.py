@@ -1,7 +1,7 @@
 """`blast-env judge`: submissions to the benchmark, judged by gas dynamics."""
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import count
@@ -11,6 +11,7 @@ from typing import Annotated, Final
 import typer
 
 from blast_env.answers import Line
+from blast_env.answers.terminal import print_line
 from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
@@ -48,6 +49,7 @@ from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_text
+from blast_env.geometry import Layout
 
 _KEPT: Final = 4096
 _OF_METHODS: Final = ("problem", "budget", "seeds", "search_cell_m")
@@ -136,14 +138,14 @@ def judge(
     with resumable(resume):
         if out is not None:
             make_folder(out)
-        submitted = [read_submission(path) for path in submissions]
-        judged = [judging.judged(item, DEFINITIONS, stored_references()) for item in submitted]
+        submitted, entries = [read_submission(path) for path in submissions], list[_Entry]()
         if plays:
             definitions = _definitions(problem, secret, sites, scenario or (), threat, cases)
-            played = [
-                judging.played(*item, definitions)
-                for item in _methods(method, run, tuple(dict.fromkeys(budget)), definitions)
-            ]
+            entries = _entries(method, run, tuple(dict.fromkeys(budget)), definitions)
+        judging.check_names([entry.method for entry in entries], submitted)
+        judged = [judging.judged(item, DEFINITIONS, stored_references()) for item in submitted]
+        if plays:
+            played = [judging.played(entry, definitions) for entry in entries]
             references = stored_references()
             if is_secret or scenario:
                 references = judging.references(played, definitions, is_secret=is_secret)
@@ -182,44 +184,89 @@ def _definitions(
         return {secret_site.name: secret_site for secret_site in secret_sites(secret, count)}
     if scenarios:
         check_names("threat", [threat], ["visible", "hidden"])
-        own = [
-            site_problems(scenario, cases, is_hidden=threat == "hidden") for scenario in scenarios
-        ]
-        return {problem.name: problem for of_site in own for problem in of_site}
+        own: dict[str, Definition] = {}
+        for site in scenarios:
+            for found in site_problems(site, cases, is_hidden=threat == "hidden"):
+                other = own.setdefault(found.name, found)
+                if other != found:
+                    raise BlastEnvError(
+                        f"--scenario {site}: its problems have the names of those of"
+                        f" {other.site}: one of the files needs another name"
+                    )
+        return own
     return {name: make(name).definition for name in problems or DEFINITIONS}
 
 
-def _methods(
+@dataclass(frozen=True)
+class _Entry:
+    """A method that runs.
+
+    Attributes:
+        name: Its name on the command line.
+        run: The method.
+        budgets: The budgets with which it enters.
+        identity: What its layouts go by besides the problem; see `play`.
+    """
+
+    name: str
+    run: Method
+    budgets: Sequence[int]
+    identity: str = ""
+
+    @property
+    def method(self) -> str:
+        """Its name in a submission."""
+        return self.name.rpartition(":")[2][-60:]
+
+
+def _entries(
     names: Sequence[str],
     runs: Sequence[Path],
     asked: Sequence[int],
     definitions: Mapping[str, Definition],
-) -> Iterator[tuple[str, Method, Sequence[int]]]:
-    """Yield names, methods and their budgets."""
+) -> list[_Entry]:
+    """Return the methods by name and the trained agents, each once."""
     with import_extra("agents", "--method"):
-        from blast_env.benchmark.methods import budgets_of, entries, method_of
-        from blast_env.surrogate import packaged_surrogate
+        from blast_env.benchmark import methods
     here = str(Path.cwd())
     if names and here not in sys.path:
         sys.path.insert(0, here)  # for module:object
     sites = [definition.scenario for definition in definitions.values()]
+    found = list[_Entry]()
     for name in names:
-        if name == AGENT:
-            yield name, method_of(agent_without_blasts()[0]), (0,)
-        elif name == SURROGATE:
-            search, digests = surrogate_search(packaged_surrogate())
-            own = FROM_AGENT if AGENT in digests else name  # two methods, never under one name
-            yield own, method_of(search), budgets_of(name, asked)
-        else:
-            yield from entries([name], asked, sites)
-    if runs:
-        with import_extra("agents", "trained agents"):
-            from blast_agents.training import load_agent
+        if name in (AGENT, SURROGATE):
+            found.append(_with_guesses(name, asked))
+            continue
+        given = [*methods.entries([name], asked, sites)]
+        found += [_Entry(*entry, methods.source_digest(name)) for entry in given]
+    found += [_trained(run, asked or BUDGETS[:2]) for run in runs]
+    return [*{(entry.name, entry.identity): entry for entry in found}.values()]
 
-            from blast_env.design.search.learnt import SurrogateSearch
-    for run in runs:
-        agent = SurrogateSearch(agent=load_agent(run))
-        yield f"agent {run.resolve().name}", method_of(agent), asked or BUDGETS[:2]
+
+def _with_guesses(name: str, asked: Sequence[int]) -> _Entry:
+    """Return the packaged agent, or the search that it begins."""
+    from blast_env.benchmark.methods import budgets_of, method_of
+    from blast_env.surrogate import packaged_surrogate
+
+    if name == AGENT:
+        agent, digests = agent_without_blasts()
+        return _Entry(name, method_of(agent), (0,), " ".join(digests.values()))
+    search, digests = surrogate_search(packaged_surrogate())
+    own = FROM_AGENT if AGENT in digests else name  # two methods, never under one name
+    return _Entry(own, method_of(search), budgets_of(name, asked), " ".join(digests.values()))
+
+
+def _trained(run: Path, budgets: Sequence[int]) -> _Entry:
+    """Return the agent of a run folder."""
+    from blast_env.benchmark.methods import method_of
+
+    with import_extra("agents", "trained agents"):
+        from blast_agents.training import load_agent
+
+        from blast_env.design.search.learnt import SurrogateSearch
+    agent = load_agent(run)
+    search = SurrogateSearch(agent=agent)
+    return _Entry(f"agent {run.resolve().name}", method_of(search), budgets, agent.digest)
 
 
 @dataclass(frozen=True)
@@ -236,23 +283,39 @@ class _Judging:
     def __post_init__(self) -> None:
         find_engine(JUDGE, self.cell_m)  # refuses unusable cells before methods run
 
-    def played(
-        self,
-        name: str,
-        method: Method,
-        budgets: Sequence[int],
-        definitions: Mapping[str, Definition],
-    ) -> Submission:
+    def check_names(self, played: Sequence[str], submitted: Sequence[Submission]) -> None:
+        """Refuse methods whose files would have one name."""
+        names: dict[str, str] = {}
+        methods = *(item.method for item in submitted), *played
+        for method in methods if self.out is not None else ():
+            if _file_name(method) in names:
+                raise BlastEnvError(
+                    f"{names[_file_name(method)]!r} and {method!r} would be one file in {self.out}:"
+                    " give each a name of its own, or a call without the other"
+                )
+            names[_file_name(method)] = method
+
+    def played(self, entry: _Entry, definitions: Mapping[str, Definition]) -> Submission:
         """Run a method; its submission is written before it is judged."""
         made = [partial(self.made, definition) for definition in definitions.values()]
-        asked = tuple(RunGrid(made, budgets, self.seeds))
+        asked, name = tuple(RunGrid(made, entry.budgets, self.seeds)), entry.name
         store = None
         if self.out is not None:  # the runs that a call may resume: same method, same cells
             store = self.out / f"runs_{_file_name(name)}_{self.search_cell_m:g}.sqlite"
+        ran: list[int] = []
+
+        def counted(problem: BenchmarkProblem, seed: int) -> Layout:
+            ran.append(seed)
+            return entry.run(problem, seed)
+
         with progress_bar(f"{len(asked)} runs of {name}") as progress:
             done = count(1)
-            runs = play(method, asked, store, lambda _: progress(next(done) / len(asked)))
-        submission = Submission(name.rpartition(":")[2][-60:], runs, f"blast-env judge: {name}")
+            advance = lambda _: progress(next(done) / len(asked))  # noqa: E731
+            runs = play(counted, asked, store, advance, entry.identity)
+        if len(ran) < len(asked):
+            kept = len(asked) - len(ran)
+            print_line(f"{kept} of {len(asked)} runs of {name} are those of an earlier call")
+        submission = Submission(entry.method, runs, f"blast-env judge: {name}")
         if self.out is not None:
             print_written([submission.save(self.out / f"{_file_name(name)}.json")])
         return submission

@@ -1,6 +1,7 @@
 """Scores between best rule and best known; what was submitted is played again."""
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env.benchmark import (
-    DEFINITIONS,
     BenchmarkProblem,
     ReferenceLayout,
     Run,
@@ -28,7 +28,6 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark.judging import read_submission
 from blast_env.cli import app
-from blast_env.cli.judge import _Judging
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from blast_env.site import Scenario
@@ -145,22 +144,32 @@ def test_the_page_of_the_documentation_shows_them() -> None:
     assert page.read_text("utf-8") == standings_page(shipped_standings())
 
 
-def near(_problem: BenchmarkProblem, _seed: int) -> Layout:
-    return wall(16)
-
-
-def far(_problem: BenchmarkProblem, _seed: int) -> Layout:
-    return wall(12)
-
-
-def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> None:
-    """Else a second method would enter the standings with the layouts of the first."""
-    judging = _Judging(0.5, 0.5, range(1), 1, None, tmp_path)
-    found = [
-        judging.played(method.__name__, method, (0,), {NAME: DEFINITIONS[NAME]}).runs[0].layout
-        for method in (near, far, near)
-    ]
-    assert found == [wall(16), wall(12), wall(16)]
+def test_pages_for_researchers_say_what_the_standings_say() -> None:
+    """The search that the packaged agent begins, by its points and scores, and who found what."""
+    entries = {entry.method: entry for entry in shipped_standings()}
+    begun, folder = entries["surrogate_from_agent"], Path(__file__).parents[2] / "docs/researchers"
+    pages = {name: (folder / f"{name}.md").read_text("utf-8") for name in ("index", "benchmark")}
+    texts = {name: " ".join(page.split()) for name, page in pages.items()}
+    lead = 100.0 * begun.lead(50).value
+    assert f"takes off {lead:.1f} points more than the best rule" in texts["index"]
+    lead = 100.0 * entries["population_annealing"].lead(50).value
+    assert f"takes off {lead:.1f} more" in texts["index"]
+    ends = []
+    for budget in (50, 0):
+        gains = [100.0 * (run.rule - run.share) for run in begun.runs if run.budget == budget]
+        ahead = [gain for gain in gains if gain > 0.0]
+        assert len(ahead) == len(gains) - 1 == 10
+        ends += [f"{min(ahead):.0f} to {max(ahead):.0f}"]
+    said = f"by {ends[0]} points**, and without a blast in the same ten, by {ends[1]}."
+    assert said in texts["benchmark"]
+    scores = [f"{begun.score(budget).value:.2f}" for budget in (50, 0)]
+    assert f"is {' and '.join(scores)}." in texts["benchmark"]
+    found = Counter(known.best.method.split(",")[0] for known in stored_references().values())
+    assert found == {"surrogate_from_agent": 7, "agent": 2, "imitation_then_ppo": 2}
+    said = "`surrogate_from_agent` seven, `agent` two, `imitation` with PPO two"
+    assert said in texts["benchmark"]
+    (version,) = {entry.engine.split()[1] for entry in entries.values()}
+    assert f"**Which version judged?** Version {version} of gas dynamics" in texts["benchmark"]
 
 
 def test_reductions_and_leads_are_over_the_problems() -> None:

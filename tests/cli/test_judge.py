@@ -1,5 +1,7 @@
 """`blast-env judge --run`, the score of a trained agent, run in this process."""
 
+import importlib
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
-from blast_env.site import AnyCharge, AnyScenario
+from blast_env.site import AnyCharge, AnyScenario, Charge, load_scenario, save_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
 from tests.cli.running import run
 from tests.evaluation.engines.shade import ShadeEngine
@@ -80,3 +82,89 @@ def test_an_entry_that_the_packaged_agent_begins_says_so(tmp_path: Path) -> None
     result = run("judge", "--method", "surrogate", *options, "--out", tmp_path)
     assert result.exit_code == 0, result.output
     assert SubmissionJudgement.load(tmp_path / "judged_surrogate_from_agent.json").runs
+
+
+# --- Kept runs are those of the same method on the same site, and names tell entries apart.
+
+
+CHEAP = ("--cases", 1, "--budget", 0, "--cell", 0.5)
+
+
+HEAVY = "2 if problem.case.charge.tnt_kg == 31.0 else 1"
+
+
+def place_at(row: int | str, name: str = "mine") -> None:
+    """Write a method that places one module in a row, as an edit of its file would leave it."""
+    body = f"def go(problem, seed):\n    return (({row}, 0),)\n"
+    Path(f"{name}.py").write_text(body, "utf-8")
+    sys.modules.pop(name, None)
+    importlib.invalidate_caches()
+
+
+def rows_of(method: str, site: Path) -> tuple[list[int], str]:
+    """Return the rows of what a method places, by its judged file, and what the command prints."""
+    result = run("judge", "--method", method, "--scenario", site, *CHEAP, "--out", "out")
+    assert result.exit_code == 0, result.output
+    found = SubmissionJudgement.load(Path("out") / f"judged_{method.partition(':')[2]}.json")
+    return [played.layout[0][0] for played in found.runs], result.stdout
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    return scenario_file(tmp_path)
+
+
+def test_a_method_that_was_edited_runs_again(site: Path) -> None:
+    """Else its author would compare the layouts of two versions and find no difference."""
+    place_at(1)
+    first, said = rows_of("mine:go", site)
+    assert (first, "earlier call" in said) == ([1], False)
+    again, said = rows_of("mine:go", site)
+    assert (again, "1 of 1 runs of mine:go are those of an earlier call" in said) == ([1], True)
+    place_at(2)
+    edited, said = rows_of("mine:go", site)
+    assert (edited, "earlier call" in said) == ([2], False)
+
+
+def test_a_site_that_was_edited_is_played_again(site: Path) -> None:
+    place_at(HEAVY)
+    assert rows_of("mine:go", site)[0] == [1]
+    save_scenario(load_scenario(site).with_charge(Charge((5.5, 6.5), 31.0)), site)
+    assert rows_of("mine:go", site)[0] == [2]
+
+
+def test_two_methods_with_one_name_do_not_share_their_runs(site: Path) -> None:
+    """Nor is the file of one written over that of the other."""
+    place_at(1)
+    place_at(2, "other")
+    assert rows_of("mine:go", site)[0] == [1]
+    assert rows_of("other:go", site)[0] == [2]
+    both = ("--method", "mine:go", "--method", "other:go", "--scenario", site, *CHEAP)
+    result = run("judge", *both, "--out", "both")
+    assert result.exit_code == 2
+    assert "'go' and 'go' would be one file in both" in " ".join(result.output.split())
+    assert not list(Path("both").glob("*.json"))
+    assert run("judge", *both).exit_code == 0
+
+
+def test_two_sites_with_one_name_are_told_apart(site: Path) -> None:
+    """One of them was left out, without a word."""
+    Path("elsewhere").mkdir()
+    twin = Path("elsewhere") / site.name
+    save_scenario(load_scenario(site).with_charge(Charge((5.5, 6.5), 31.0)), twin)
+    place_at(1)
+    options = ("--method", "mine:go", "--scenario", site, "--scenario", twin, *CHEAP)
+    result = run("judge", *options)
+    assert result.exit_code == 2
+    assert "one of the files needs another name" in " ".join(result.output.split())
+
+
+def test_a_site_of_ones_own_has_no_name_of_the_benchmark(site: Path) -> None:
+    own = site.with_name("control_room.toml")
+    save_scenario(load_scenario(site), own)
+    place_at(1)
+    result = run("judge", "--method", "mine:go", "--scenario", own, *CHEAP)
+    assert result.exit_code == 2
+    assert "give the file another name" in " ".join(result.output.split())
