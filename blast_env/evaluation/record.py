@@ -53,7 +53,8 @@ class StructureLoad:
         in_range: Whether this distance and charge lie in the range of the calibration.
         notes: Reasons if they do not, one sentence each.
         building: The building that it is part of; its own name if it is a building by itself.
-        area_m2: Area of the counted walls; `None` where the engine has no areas.
+        area_m2: Area of the counted walls, 0 if the load on them is not known; `None` where the
+            engine has no areas.
         response: Response of its bays in the objective; `None` unless the objective is a response.
         worst_damage: The largest damage of its bays, for the same objective.
         validation: Validation status of the load, with its reason.
@@ -181,7 +182,7 @@ class BlastLoads:
     Attributes:
         structures: One load per structure, in the order of the scene.
         module_impulse_n_s: Momentum on the walls of the structures' modules, N s, in the order
-            of the scene (modules,); empty for particles.
+            of the scene (modules,); empty for particles, and for engines without loads on modules.
         bays: Damage of the bays of facades with each of their possible components; empty unless
             the objective is a response.
         module_impulse_sim: Sum of m |v| on each module, simulation units (modules,); empty without
@@ -246,7 +247,7 @@ class BlastLoads:
         on_modules = self.module_impulse_sim if self.has_particles else self.module_impulse_n_s
         return (
             names == [structure.name for structure in left]
-            and on_modules.shape == (modules,)
+            and (on_modules.shape == (modules,) or not (len(on_modules) or self.has_particles))
             and bool(np.isfinite(impulses).all() and np.isfinite(on_modules).all())
             and self._has_bays_of(found)
         )

@@ -422,6 +422,20 @@ def counted_faces(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.i
     return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
 
 
+def structures_without_air(site: BlastSite) -> frozenset[str]:
+    """Return the structures of which no air touches a counted wall, which have no load.
+
+    Air before pieces that lean on a wall counts. No blast is run.
+    """
+    grid = _grid(GasSettings(), site)
+    table = face_table_of(grid, site)
+    return frozenset(
+        outline.name
+        for index, outline in enumerate(site.structures)
+        if not (outline.is_barrier or len(counted_faces(table, site, index)))
+    )
+
+
 def _groups(
     table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:

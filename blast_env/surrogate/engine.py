@@ -3,11 +3,10 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import isnan, nan
 from pathlib import Path
 from typing import ClassVar, Final
-
-import numpy as np
 
 from blast_env.compilation import compilation_notice
 from blast_env.evaluation.engines import Engine, find_engine
@@ -26,18 +25,28 @@ SURROGATE: Final = "surrogate"
 
 _NOTES: Final = ("a prediction of the surrogate, not a blast",)
 _GUESSED: Final = Validation(ValidationStatus.APPROXIMATE, "a guess of gas dynamics")
+_NOT_GUESSED: Final = Validation(ValidationStatus.OUTSIDE, "not protected, so not predicted")
 _NAMED: Final = 5  # structures in one sentence
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
 
-def _zero_loads(site: SurrogateSite) -> tuple[StructureLoad, ...]:
-    """Return no load on each structure, which is that of those that are not protected."""
-    peak_pa = 0.0 if site.counts_peaks else None
-    return tuple(
-        StructureLoad.on(structure, 0.0, peak_pa, notes=_NOTES, validation=_GUESSED)
-        for structure in site.scenario.structures
-    )
+def _no_loads(site: SurrogateSite) -> list[StructureLoad]:
+    """Return the loads before a prediction: none on structures that are not protected.
+
+    As where no air touches a wall, such a load is NaN, and the area that it is the mean of 0.
+    """
+    areas_m2 = dict(zip((own.name for own in site.protected), site.areas_m2.tolist(), strict=True))
+    return [
+        StructureLoad.on(
+            own,
+            nan,
+            notes=_NOTES,
+            area_m2=areas_m2.get(own.name, 0.0),
+            validation=_GUESSED if own.protected else _NOT_GUESSED,
+        )
+        for own in site.scenario.structures
+    ]
 
 
 class _SiteLoads:
@@ -45,31 +54,36 @@ class _SiteLoads:
 
     def __init__(self, site: SurrogateSite) -> None:
         self.site = site
-        structures = site.scenario.structures
-        self._zero_loads = _zero_loads(site)
-        place = {structure.name: number for number, structure in enumerate(structures)}
+        self._no_loads = _no_loads(site)
+        place = {own.name: number for number, own in enumerate(site.scenario.structures)}
         self._places = [place[structure.name] for structure in site.protected]
-        self._of_modules = np.repeat(np.arange(len(structures)), [s.modules for s in structures])
 
-    def loads(self, guess: Guess) -> list[BlastLoads]:
+    def loads(self, guess: Guess, layouts: Sequence[Sequence[Element]]) -> list[BlastLoads]:
         """Return the loads of each layout of a prediction."""
-        # 1. Predictions of protected structures at their places, 0 for the others.
-        on_structures = np.zeros((len(guess.impulse_pa_s), len(self._zero_loads)))
-        on_structures[:, self._places] = guess.impulse_pa_s
-        # 2. All modules of a structure have its mean.
-        on_modules = on_structures[:, self._of_modules]
         impulses_pa_s = guess.impulse_pa_s.tolist()
         nothing = [[None] * len(self._places)] * len(impulses_pa_s)
         peaks_pa = nothing if guess.peak_pa is None else guess.peak_pa.tolist()
-        # 3. Loads by structure; with the response of bays, where the objective asks for it.
+        # Predictions of protected structures at their places; with the response of bays, where the
+        # objective asks for it.
         responds, found = self.site.scenario.objective.is_response, []
         for index, predicted in enumerate(zip(impulses_pa_s, peaks_pa, strict=True)):
-            loads = list(self._zero_loads)
+            loads = list(self._no_loads)
             for place, impulse_pa_s, peak_pa in zip(self._places, *predicted, strict=True):
                 loads[place] = loads[place].with_load(impulse_pa_s, peak_pa)
+                if isnan(impulse_pa_s):
+                    loads[place] = replace(loads[place], area_m2=0.0)
             bays = guess.bays(self.site, index) if responds else ()
-            found.append(BlastLoads(tuple(loads), on_modules[index], bays))
+            found.append(BlastLoads(self._left(loads, layouts[index]), bays=bays))
         return found
+
+    def _left(
+        self, loads: Sequence[StructureLoad], layout: Sequence[Element]
+    ) -> tuple[StructureLoad, ...]:
+        """Return the loads on the structures that a layout leaves."""
+        if not self.site.lets_go:
+            return tuple(loads)
+        names = {own.name for own in self.site.scenario.structures_with(layout)}
+        return tuple(load for load in loads if load.name in names)
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,7 @@ class SurrogateEngine(Engine):
 
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
     milliseconds. Agents trained on it must be judged by gas dynamics. It predicts peaks only if
-    the objective counts them. Structures that are not protected have zero loads. The response of
+    the objective counts them. Structures that are not protected have no load. The response of
     facades is that to triangular loads of the predicted impulse and peak, equal on all bays of a
     structure (`Guess.loads`).
 
@@ -121,8 +135,7 @@ class SurrogateEngine(Engine):
             seed: Ignored: predictions have no noise.
 
         Returns:
-            The loads. All modules of a structure have the same load, since only the mean is
-            predicted.
+            The loads on protected structures; none on others and on modules.
 
         Raises:
             BlastEnvError: If no structure is protected.
@@ -140,7 +153,7 @@ class SurrogateEngine(Engine):
         if not others:
             return (no_blasts,)
         names = ", ".join(others[:_NAMED]) + ", ..." * (len(others) > _NAMED)
-        return no_blasts, f"{names}: not protected, so not predicted: the 0 there is no load"
+        return no_blasts, f"{names}: not protected, so not predicted"
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks."""
@@ -169,8 +182,11 @@ class SurrogateEngine(Engine):
             served.append(self._site(own[0].scenario))
             charges = [charge_against(*blast[:3]) for blast in own]
             asked.append((served[-1].site, [blast.layout for blast in own], charges))
-        pairs = zip(served, self.surrogate.guesses(asked), strict=True)
-        return [item.loads(guess) for item, guess in pairs]
+        guesses = self.surrogate.guesses(asked)
+        return [
+            item.loads(guess, layouts)
+            for item, guess, (_, layouts, _) in zip(served, guesses, asked, strict=True)
+        ]
 
     def _site(self, scenario: Scenario) -> _SiteLoads:
         key = scenario.content_hash

@@ -5,12 +5,12 @@ weighted, number by number, by how a piece stands to the others. The prediction 
 function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import sha256
 from itertools import zip_longest
-from math import prod
+from math import isnan, nan, prod
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -139,10 +139,11 @@ class Guess(NamedTuple):
     """Predicted loads of layouts.
 
     Attributes:
-        impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
+        impulse_pa_s: Mean impulse on each protected structure, NaN if no air touches its assessed
+            walls (layouts, structures).
         spread: Standard deviation of its logarithm among the members (layouts, structures).
-        peak_pa: Largest overpressure on each protected structure (layouts, structures); `None` if
-            the objective counts no peaks.
+        peak_pa: Largest overpressure on each protected structure, NaN as of the impulse (layouts,
+            structures); `None` if the objective counts no peaks.
         peak_spread: Standard deviation of its logarithm among the members (layouts, structures).
     """
 
@@ -154,9 +155,10 @@ class Guess(NamedTuple):
     def loads(self, site: SurrogateSite, layouts: Sequence[Sequence[Element]] = ()) -> FloatArray:
         """Return the load of each layout, in the objective's unit (layouts,).
 
-        If the objective counts the response of facades, each bay of a structure has a triangular
-        load with the predicted impulse and peak of the structure. The peak is the largest one on
-        the structure, so that the response is conservative.
+        That of a building is the mean over the area of its parts. It is NaN if a building has no
+        load. If the objective counts the response of facades, each bay of a structure has a
+        triangular load with the predicted impulse and peak of the structure. The peak is the
+        largest one on the structure, so that the response is conservative.
 
         Args:
             site: The site of the prediction.
@@ -168,7 +170,7 @@ class Guess(NamedTuple):
                 [self._response(site, index, layout) for index, layout in enumerate(layouts)]
             )
         peak_pa = np.zeros_like(self.impulse_pa_s) if self.peak_pa is None else self.peak_pa
-        both = np.stack((self.impulse_pa_s, peak_pa), axis=2).tolist()
+        both = np.stack(site.of_buildings(self.impulse_pa_s, peak_pa), axis=2).tolist()
         return np.array(
             [
                 sum(
@@ -179,22 +181,43 @@ class Guess(NamedTuple):
             ]
         )
 
+    def without(self, hidden: BoolArray) -> "Guess":
+        """Return no loads, which are NaN, on hidden structures (layouts, structures)."""
+        impulse_pa_s = np.where(hidden, nan, self.impulse_pa_s)
+        peak_pa = None if self.peak_pa is None else np.where(hidden, nan, self.peak_pa)
+        return self._replace(impulse_pa_s=impulse_pa_s, peak_pa=peak_pa)
+
     def bays(self, site: SurrogateSite, index: int) -> tuple[BayDamage, ...]:
         """Return the damage of the bays behind a layout, by its index, under triangular loads."""
         assert self.peak_pa is not None
         found: list[BayDamage] = []
         for column, structure in enumerate(site.protected):
             peak_pa, impulse_pa_s = self.peak_pa[index, column], self.impulse_pa_s[index, column]
-            found += site.bay_damages(structure.name, float(peak_pa), float(impulse_pa_s))
+            if not np.isnan(impulse_pa_s):
+                found += site.bay_damages(structure.name, float(peak_pa), float(impulse_pa_s))
         return tuple(found)
 
     def _response(self, site: SurrogateSite, index: int, layout: Sequence[Element]) -> float:
         assert self.peak_pa is not None
         loads = zip(self.peak_pa[index].tolist(), self.impulse_pa_s[index].tolist(), strict=True)
+        # A building without a load has no response. A part of another one counts as 0.
+        of_buildings, _ = site.of_buildings(self.impulse_pa_s[index : index + 1], self.peak_pa[:1])
+        if np.isnan(of_buildings).any():
+            return nan
         return sum(
             structure.weight * site.response(structure.name, layout, *load)
             for structure, load in zip(site.protected, loads, strict=True)
+            if not isnan(load[1])
         )
+
+
+def _in_order(numbers: Sequence[Sequence[int]], made: Iterator[Guess]) -> Guess:
+    """Return the guess of all layouts of a site from the next ones of parts, by their numbers."""
+    order = np.argsort(np.concatenate(numbers))
+    fields: list[Any] = [*zip(*(next(made) for _ in numbers), strict=True)]
+    for number, own in enumerate(fields):
+        fields[number] = None if own[0] is None else np.concatenate(own)[order]
+    return Guess(*fields)
 
 
 class Member(NamedTuple):
@@ -366,6 +389,20 @@ class Surrogate:
         Args:
             asked: A site, its layouts and the charge against each of them.
         """
+        if not any(site.lets_go for site, *_ in asked):
+            return self._guesses(asked)
+        # Layouts by the structures that they leave, all at once, and back in their order.
+        parts = [site.by_structures(layouts) for site, layouts, _ in asked]
+        of_parts = [
+            (left, [layouts[k] for k in own], [charges[k] for k in own])
+            for (_, layouts, charges), of_site in zip(asked, parts, strict=True)
+            for left, own in of_site
+        ]
+        made = iter(self._guesses(of_parts))
+        return [_in_order([own for _, own in of_site], made) for of_site in parts]
+
+    def _guesses(self, asked: Sequence[Asked]) -> list[Guess]:
+        """Return the same for layouts that take no structure away."""
         found: list[list[FloatArray]] = [[], []]
         places = [self._put_logs(*one, found) for one in asked]
         # ln load by each network; the prediction and its spread over the networks, which were
@@ -381,7 +418,8 @@ class Surrogate:
                     item[first : firsts[which]].reshape(len(layouts), -1)[place]
                     for item in both[which]
                 ]
-            guesses.append(Guess(*own))
+            hidden = site.hidden(layouts)
+            guesses.append(Guess(*own) if hidden is None else Guess(*own).without(hidden))
         return guesses
 
     def _put_logs(

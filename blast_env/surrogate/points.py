@@ -70,7 +70,7 @@ def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArra
     levels = max(1, round(rise_m / (_UP_M * apart)))
     z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
     rows = []
-    for length_m, (x_out, y_out), line in _walls(structure):
+    for length_m, (x_out, y_out), line in walls_of(structure):
         number = max(1, round(length_m / (_ALONG_M * apart)))
         area_m2 = length_m * rise_m / (number * levels)
         for along_m in (np.arange(number) + 0.5) * length_m / number:
@@ -86,7 +86,7 @@ def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArra
     return np.array(rows)
 
 
-def _walls(
+def walls_of(
     structure: AnyStructure,
 ) -> Iterator[tuple[float, tuple[float, float], WallLine | None]]:
     """Yield length, outward normal and, of a polygon, line of each counted wall."""
@@ -104,5 +104,5 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
     # Points are per area: their number falls with the square of their distance.
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
-        area_m2 += height_m * sum(length_m for length_m, *_ in _walls(structure))
+        area_m2 += height_m * sum(length_m for length_m, *_ in walls_of(structure))
     return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))

@@ -3,22 +3,25 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
+from math import nan
 from operator import attrgetter
 from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.record import structure_response
-from blast_env.geometry import Element, Measure, Rectangle, standing
+from blast_env.geometry import Element, Layout, Measure, Rectangle, standing
+from blast_env.layout.build_site import barrier_outline, outlines
 from blast_env.response.damage import TriangularLoads
 from blast_env.response.levels import BayDamage
 from blast_env.site import Scenario
-from blast_env.site.blast_site import Charge
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.facade import BayComponents
 from blast_env.site.structures import ground_below_m, is_open_below
 from blast_env.surrogate.approach import Approach, curves
+from blast_env.surrogate.hiding import may_be_hidden
 from blast_env.surrogate.loads import SiteArrays
 from blast_env.surrogate.neighbours import piece_traits
 from blast_env.surrogate.pieces import Box, Memory
@@ -74,8 +77,118 @@ class SurrogateSite:
             )
             for structure in self.protected
         }
+        self._hideable = may_be_hidden(self.protected, scenario)
+        self._hidden: dict[Layout, list[bool]] = {}
+        self._left: dict[frozenset[str], SurrogateSite] = {}
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
         self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
+
+    @property
+    def lets_go(self) -> bool:
+        """Whether layouts may take structures away."""
+        zone = self.scenario.build_zone
+        return zone is not None and bool(zone.removable)
+
+    def by_structures(
+        self, layouts: Sequence[Sequence[Element]]
+    ) -> "list[tuple[SurrogateSite, list[int]]]":
+        """Return the sites with the structures that layouts leave, and the numbers of the layouts.
+
+        There is at least one site.
+        """
+        if not (self.lets_go and layouts):
+            return [(self, [*range(len(layouts))])]
+        of_sites: dict[frozenset[str], list[int]] = {}
+        for number, layout in enumerate(layouts):
+            of_sites.setdefault(self.scenario.zone.taken_away(layout), []).append(number)
+        return [(self._without(away), numbers) for away, numbers in of_sites.items()]
+
+    def _without(self, away: frozenset[str]) -> "SurrogateSite":
+        """Return the site without some structures, which are not protected."""
+        if not away:
+            return self
+        if away not in self._left:
+            scenario = self.scenario
+            # The air stays as high as it is with all structures.
+            site = scenario.site.model_copy(update={"air_height_m": scenario.air_height_m})
+            left = tuple(own for own in scenario.structures if own.name not in away)
+            zone = scenario.zone.model_copy(update={"removable": ()})
+            changed = {"site": site, "structures": left, "build_zone": zone}
+            self._left[away] = SurrogateSite(scenario.model_copy(update=changed), self.memory)
+        return self._left[away]
+
+    def hidden(self, layouts: Sequence[Sequence[Element]]) -> BoolArray | None:
+        """Return which protected structures have no load behind layouts (layouts, structures).
+
+        No air touches their assessed walls: other structures stand there, or pieces fill the gap
+        before these. `None` where nothing can hide any.
+        """
+        if not self._hideable:
+            return None
+        return np.array([self._hidden_by(tuple(sorted(standing(layout)))) for layout in layouts])
+
+    def _hidden_by(self, barrier: Layout) -> list[bool]:
+        if barrier not in self._hidden:
+            from blast_env.gas.engine import structures_without_air
+
+            scenario = self.scenario
+            structures = outlines(scenario)
+            if barrier:
+                structures += (barrier_outline(scenario, barrier),)
+            site = BlastSite(
+                site_m=scenario.site.rectangle_m,
+                charge=Charge(scenario.site.rectangle_m.centre, 1.0),  # no wall depends on it
+                structures=structures,
+                air_height_m=scenario.air_height_m,
+            )
+            names = structures_without_air(site)
+            self._hidden[barrier] = [own.name in names for own in self.protected]
+        return self._hidden[barrier]
+
+    @property
+    def without_load(self) -> tuple[str, ...]:
+        """The protected buildings without a load where no barrier stands."""
+        hidden = self.hidden([()])
+        if hidden is None:
+            return ()
+        names = [own.building_name for own in self.protected]
+        loaded = {name for name, is_hidden in zip(names, hidden[0], strict=True) if not is_hidden}
+        return tuple(dict.fromkeys(name for name in names if name not in loaded))
+
+    @cached_property
+    def areas_m2(self) -> FloatArray:
+        """Area of the assessed walls of each protected structure (structures,)."""
+        return np.add.reduceat(self._points.area_m2, self._points.starts)
+
+    @cached_property
+    def _parts(self) -> list[list[int]]:
+        """The numbers of the protected parts of each building that has several."""
+        parts: dict[str, list[int]] = {}
+        for number, structure in enumerate(self.protected):
+            parts.setdefault(structure.building_name, []).append(number)
+        return [own for own in parts.values() if len(own) > 1]
+
+    def of_buildings(
+        self, impulse_pa_s: FloatArray, peak_pa: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the impulses on buildings in the place of those on their parts, and the peaks.
+
+        Impulses are means over the area of the parts with a load. The peak on a part without one
+        counts as 0 if others have one. All have the shape (layouts, structures).
+        """
+        if not self._parts:
+            return impulse_pa_s, peak_pa
+        impulse_pa_s, peak_pa = impulse_pa_s.copy(), peak_pa.copy()
+        for own in self._parts:
+            parts = impulse_pa_s[:, own]
+            area_m2 = np.where(np.isnan(parts), 0.0, self.areas_m2[own])
+            whole_m2 = area_m2.sum(axis=1)
+            total = (area_m2 * np.nan_to_num(parts)).sum(axis=1)
+            mean = np.divide(total, whole_m2, out=np.full(len(total), nan), where=whole_m2 > 0.0)
+            impulse_pa_s[:, own] = mean[:, np.newaxis]
+            is_part = np.isnan(parts) & (whole_m2 > 0.0)[:, np.newaxis]
+            peak_pa[:, own] = np.where(is_part, 0.0, peak_pa[:, own])
+        return impulse_pa_s, peak_pa
 
     @cached_property
     def arrays(self) -> SiteArrays:

@@ -1,5 +1,7 @@
 """Predicted shares of the load with their intervals."""
 
+from math import isnan
+
 from blast_env.benchmark import BenchmarkProblem
 from blast_env.geometry import Layout
 from blast_env.surrogate import Surrogate, SurrogateSite
@@ -29,4 +31,6 @@ def guessed_shares(
         for found, own in zip(loads, ends, strict=True):
             found.append(own.loads(site, [layout]).item())
     share, low, high = (case.objective_value(own, layout) / unprotected for own in loads)
+    if isnan(share):  # it counts as nothing placed, as in a blast
+        return 1.0, 1.0, 1.0
     return share, low, high

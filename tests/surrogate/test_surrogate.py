@@ -478,10 +478,10 @@ def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
     protected = [[structure.impulse_pa_s for structure in of_blast.protected] for of_blast in loads]
     assert protected == [pytest.approx(said[0]), protected[0], pytest.approx(said[1])]
     others = [structure for structure in loads[0].structures if not structure.protected]
-    assert all(other.impulse_pa_s == 0.0 for other in others)
+    assert np.isnan([other.impulse_pa_s for other in others]).all()
     street = load_scenario("street_front")
     said_of_it = evaluator.engine.caveats(street)
-    assert "shops: not protected, so not predicted: the 0 there is no load" in said_of_it
+    assert "shops: not protected, so not predicted" in said_of_it
     assert loads[0].are_for(YARD)
     assert evaluator.counts.blasts == 2  # a seed changes nothing
     assert evaluator.calibration_name == "none"

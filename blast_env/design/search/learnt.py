@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import cycle
-from math import ceil
+from math import ceil, inf, isnan
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from blast_env.design.search.problem import Progress, Report, SamplingAgent, Sea
 from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
-from blast_env.evaluation.cases import one_per_charge, search_set
+from blast_env.evaluation.cases import check_loaded, one_per_charge, search_set
 from blast_env.geometry import Layout
 from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, Scenario
@@ -60,18 +60,24 @@ class Guesses:
         """Return an empty cache.
 
         Raises:
-            BlastEnvError: If no structure is protected.
+            BlastEnvError: If no structure is protected, or one has no load without a barrier.
         """
-        return cls(surrogate, case, site_of(case.scenario))
+        site = site_of(case.scenario)
+        check_loaded(case, site.without_load)
+        return cls(surrogate, case, site)
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
-        """Return the predicted value of the objective for each layout (layouts,)."""
+        """Return the predicted value of the objective for each layout (layouts,).
+
+        It is infinite of a layout that hides a building, so that this is never the best one.
+        """
         new = [layout for layout in dict.fromkeys(layouts) if layout not in self._known]
         if new:
             # One call of the network per threat for all layouts: it is fast in batches.
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
             for layout, loads in zip(new, np.transpose(by_threat), strict=True):
-                self._known[layout] = self.case.objective_value(loads, layout)
+                value = self.case.objective_value(loads, layout)
+                self._known[layout] = inf if isnan(value) else value
         return np.array([self._known[layout] for layout in layouts])
 
     @property

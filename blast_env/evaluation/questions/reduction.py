@@ -482,7 +482,7 @@ class Evaluation:
 
         The columns are `module_id`, `structure`, `x_m`, `y_m`, the load on the module with the
         barrier and without (for particles `impulse_sim`, the sum of m |v|; for gas `impulse_n_s`,
-        the momentum on its walls), and its `reduction`.
+        the momentum on its walls), and its `reduction`; NaN of an engine without loads on modules.
         """
         from blast_env.particles.objects import obstacle_of
         from blast_env.particles.tables import module_table
@@ -501,7 +501,9 @@ class Evaluation:
         )
         left = {structure.name for structure in self.scenario.structures_with(self.layout)}
         structures = [own for own in scene.structures if own.name in left]
-        if len(structures) < len(scene.structures):
+        if not len(without):  # an engine without loads on modules
+            impulse = without = np.full(sum(len(own.filled) for own in structures), np.nan)
+        elif len(structures) < len(scene.structures):
             is_left = [own.name in left for own in scene.structures for _ in own.filled]
             without = without[is_left]
         values = {

@@ -1,0 +1,129 @@
+"""Guesses agree with gas dynamics about what has a load, and what it is the load of."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from blast_env.design.search import Guesses
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import (
+    BlastEvaluator,
+    BlastLoads,
+    LoadCase,
+    LoadCaseSet,
+    draw_threats,
+    evaluate_layout,
+)
+from blast_env.evaluation.engines.contract import EngineBlast
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.geometry import Layout
+from blast_env.site import Scenario, save_scenario
+from blast_env.surrogate import SurrogateEngine, packaged_surrogate, site_of
+from tests.catalogue_sites import WALL, yard_document
+from tests.cli.running import run
+from tests.evaluation.test_walls_without_verdict import CHARGE, WALLS, site
+from tests.site.test_removable import AWAY, fenced
+
+SURROGATE = SurrogateEngine()
+COARSE = GasEngine.with_cells("coarse")
+
+
+def known(loads: BlastLoads) -> dict[str, bool]:
+    return {load.name: bool(np.isfinite(load.impulse_pa_s)) for load in loads.protected}
+
+
+@pytest.mark.parametrize(
+    ("others", "layout"),
+    [
+        ((), ()),
+        (("other",), ()),
+        (("other",), WALLS[:1]),
+        (("other",), WALLS),
+        (("other", "house"), WALLS),
+        (("porch", "house"), ()),
+        (("annex",), ()),
+    ],
+)
+def test_what_no_air_touches_has_no_load(others: tuple[str, ...], layout: Layout) -> None:
+    """The surrogate had guessed one, as if the wall stood in the open."""
+    scenario = site(*others)
+    guessed, computed = (
+        engine.loads(scenario, layout, CHARGE, 0) for engine in (SURROGATE, COARSE)
+    )
+    assert known(guessed) == known(computed)
+    assert guessed.without_load == computed.without_load
+    assert np.isnan(guessed.protected_impulse_pa_s) == np.isnan(computed.protected_impulse_pa_s)
+    guess = packaged_surrogate().guess(site_of(scenario), [layout], [CHARGE])
+    own = guess.loads(site_of(scenario))
+    np.testing.assert_allclose(own, [guessed.protected_impulse_pa_s], rtol=1e-9)
+
+
+def test_no_search_by_guesses_likes_to_hide_a_building() -> None:
+    scenario = site("other")
+    case = LoadCaseSet(scenario, (LoadCase(CHARGE),))
+    guesses = Guesses.of(packaged_surrogate(), case)
+    bare, hidden = guesses.loads([(), WALLS])
+    assert 0.0 < bare < hidden
+    assert guesses.ranked() == [(), WALLS]
+    covered = replace(case, scenario=site("porch"))
+    with pytest.raises(BlastEnvError, match="lane: no load without a barrier on front: no air"):
+        Guesses.of(packaged_surrogate(), covered)
+    env = gym.make("BlastBarrier-v0", scenario=scenario, engine=SURROGATE, reward="relative")
+    env.reset(seed=0, options={"layout": WALLS})
+    *_, paid, _, _, info = env.step(env.get_wrapper_attr("finish"))
+    assert (paid, info["reduction"]) == (0.0, 0.0)
+
+
+def test_what_a_layout_takes_away_stops_nothing_any_more() -> None:
+    """The surrogate had left it standing."""
+    scenario, never = fenced(), Scenario.from_document(yard_document(), "yard")
+    charge = draw_threats(scenario, [0])[0].charge
+    there, away = SURROGATE.loads_at_once(
+        [EngineBlast(scenario, layout, charge, 0) for layout in (WALL, (*WALL, AWAY))]
+    )
+    alone = SURROGATE.loads(never, WALL, charge, 0)
+    assert [load.name for load in away.structures] == ["hut"]
+    assert [load.name for load in there.structures] == ["hut", "fence"]
+    assert away.protected_impulse_pa_s == alone.protected_impulse_pa_s
+    assert there.protected_impulse_pa_s < away.protected_impulse_pa_s
+
+
+def test_the_load_of_a_building_is_the_mean_over_the_area_of_its_parts(tmp_path: Path) -> None:
+    """Weights of the parts had taken the place of areas, which gas dynamics takes."""
+    document = site("house").model_dump(mode="json", exclude_none=True)
+    front, house = document["structures"]
+    front["building"] = house["building"] = "school"
+    house |= {"corner_m": [8.0, 6.0], "rows": 4}
+    scenario = Scenario.from_document(document, "school")
+    for engine in (SURROGATE, COARSE):
+        loads = BlastEvaluator(scenario, engine, cache=tmp_path).loads((), LoadCase(CHARGE))
+        one, other = (load.impulse_pa_s for load in loads.structures)
+        mean = (8 * one + 4 * other) / 12
+        assert loads.protected_impulse_pa_s == pytest.approx(2.0 * mean, rel=1e-9)
+    guess = packaged_surrogate().guess(site_of(scenario), [()], [CHARGE])
+    again = SURROGATE.loads(scenario, (), CHARGE, 0).protected_impulse_pa_s
+    assert guess.loads(site_of(scenario)).item() == pytest.approx(again, rel=1e-9)
+
+
+def test_a_load_that_is_not_predicted_is_a_dash_and_null(tmp_path: Path) -> None:
+    """It had been 0, and that on a module the impulse of its structure in the unit of momentum."""
+    save_scenario(site("other"), tmp_path / "site.toml")
+    (tmp_path / "layout.json").write_text("[]")
+    files = ("--scenario", tmp_path / "site.toml", "--layout", tmp_path / "layout.json")
+    done = run("evaluate", *files, "--engine", "surrogate")
+    (row,) = (line.split() for line in done.output.splitlines() if line.startswith("other "))
+    assert row[1:6] == ["no", "-", "-", "-", "-"]
+    assert "note: other: not protected, so not predicted" in done.output
+    found = json.loads(run("evaluate", *files, "--engine", "surrogate", "--json").stdout)
+    loads = {row["structure"]: row["impulse_pa_s"] for row in found["structures"]}
+    assert loads["front"] > 0.0
+    assert loads["other"] is None
+    modules = evaluate_layout(
+        site("other"), (), threats=[LoadCase(CHARGE)], engine=SURROGATE
+    ).module_table
+    assert len(modules) == 32
+    assert modules["impulse_n_s"].isna().all()
