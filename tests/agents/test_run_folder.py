@@ -6,6 +6,7 @@ from pathlib import Path
 from shutil import copytree
 from zipfile import ZIP_DEFLATED, ZipFile
 
+import numpy as np
 import pytest
 import torch
 from blast_agents.training import load_agent, resume, train
@@ -137,6 +138,43 @@ def test_a_damaged_folder_is_refused_with_the_reason(
     damage(run)
     with pytest.raises(BlastEnvError, match=words):
         resume(run)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("evaluation_cases: ", "evaluation_cases: 1", "evaluation_cases is 12, must be 2 as"),
+        (
+            "evaluation_first_seed: ",
+            "evaluation_first_seed: 1",
+            "evaluation_first_seed is 10, must be 0",
+        ),
+        ("threat: visible", "threat: hidden", "threat is 'hidden', must be 'visible' as in"),
+        ("evaluation_engine: null", "evaluation_engine: gas", "evaluation_engine is 'gas', must"),
+    ],
+)
+def test_evaluations_of_other_threats_do_not_go_on_with_a_run(
+    finished: Path, tmp_path: Path, before: str, after: str, words: str
+) -> None:
+    """The weights of the largest reduction would be those of the easiest threats."""
+    run = Path(copytree(finished, tmp_path / "run"))
+    edit(ARGS, before, after)(run)
+    with pytest.raises(BlastEnvError, match=words):
+        resume(run)
+
+
+def test_an_evaluation_that_does_not_say_its_settings_goes_on(
+    finished: Path, tmp_path: Path
+) -> None:
+    """Those of earlier versions."""
+    run = Path(copytree(finished, tmp_path / "run"))
+    with np.load(run / EVALUATIONS) as arrays:
+        columns = {name: arrays[name] for name in arrays.files if name != "judging"}
+    np.savez(run / EVALUATIONS, **columns, judging=["["])
+    with pytest.raises(BlastEnvError, match="is missing or damaged"):
+        resume(run)
+    np.savez(run / EVALUATIONS, **columns)
+    assert len(resume(run).evaluations) > len(columns["timesteps"])
 
 
 def test_a_tensor_larger_than_its_file_is_refused(finished: Path, tmp_path: Path) -> None:

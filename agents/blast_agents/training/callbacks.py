@@ -1,5 +1,6 @@
 """The callback that evaluates a training on held-out threats and keeps its weights."""
 
+import json
 from collections.abc import Callable
 from time import perf_counter
 
@@ -110,6 +111,7 @@ class ValidationCallback(BaseCallback):
             self._episodes,
             self._spent,
             self._seconds + perf_counter() - self._began_s,
+            json.dumps(self.settings.judging),
         )
         best = best_of(self.rows)
         if best is None or row.reduction > best.reduction:

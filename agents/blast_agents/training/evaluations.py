@@ -4,16 +4,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from io import BytesIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
-from blast_agents.training.run_folder import RunConfiguration, RunFolder, refusing
+from blast_agents.training.run_folder import (
+    RunConfiguration,
+    RunFolder,
+    TrainingSettings,
+    refusing,
+)
 from blast_agents.training.weights import check_zip
-from blast_env.documents import parse_csv, read_text
-from blast_env.errors import BlastEnvError
+from blast_env.documents import checked_as, parse_csv, parse_json, read_text
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import read_regular, write_atomically
 from blast_env.plots.site_plan import write_heading
 from blast_env.plots.style import number_on_axis, render_extra
@@ -43,6 +48,7 @@ class EvaluationRow:
         episodes: Episodes of training.
         blasts: Blasts of training, without those of the evaluations.
         seconds: Duration of the training, in s.
+        judging: `TrainingSettings.judging` as JSON; empty if the file does not say.
     """
 
     timesteps: int
@@ -54,6 +60,7 @@ class EvaluationRow:
     episodes: int
     blasts: int
     seconds: float
+    judging: str = ""
 
 
 _NAMES: Final = tuple(field.name for field in fields(EvaluationRow))
@@ -90,13 +97,39 @@ def read_evaluations(path: Path) -> list[EvaluationRow]:
         content = BytesIO(read_regular(path, _MOST_BYTES))
         check_zip(content)
         with np.load(content) as arrays:
-            columns = [arrays[name].tolist() for name in _NAMES]
+            count = len(arrays[_NAMES[0]])
+            unsaid = {"judging": np.array([""] * count)}
+            columns = [{**unsaid, **arrays}[name].tolist() for name in _NAMES]
         rows = [dict(zip(_NAMES, row, strict=True)) for row in zip(*columns, strict=True)]
         return _ROWS.validate_python(rows)
     # NumPy reports a faulty file by exceptions of many types.
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise BlastEnvError(f"{path}: is damaged: {reason}") from error
+
+
+def check_judging(rows: Sequence[EvaluationRow], settings: TrainingSettings, place: Path) -> None:
+    """Refuse settings by which further evaluations would not compare with those of a run.
+
+    Args:
+        rows: The evaluations of the run.
+        settings: Its settings now.
+        place: The run folder, for the error.
+
+    Raises:
+        BlastEnvError: If one differs, which the message names, or the evaluations are damaged.
+    """
+    said = next((row.judging for row in rows if row.judging), "")
+    with refusing(place):
+        before = checked_as(dict[str, Any], parse_json(said or "{}"))
+    now = settings.judging
+    for name, value in before.items():
+        if now.get(name) != value:
+            raise BlastEnvError(
+                f"{place}: {name} is {value_text(now.get(name))}, must be {value_text(value)} as in"
+                " the evaluations of the run, of which one has the best weights; train --start-from"
+                f" {place} begins another run with them"
+            )
 
 
 @dataclass(frozen=True)

@@ -126,6 +126,19 @@ class TrainingSettings(BaseModel):
             return find_engine(self.evaluation_engine)
         return find_engine(JUDGE) if self.guesses else self.blast_engine
 
+    @property
+    def judging(self) -> dict[str, Any]:
+        """The settings that evaluations of one run have in common, so that one is the best."""
+        is_own = not (self.guesses or self.evaluation_engine)
+        return {
+            "evaluation_engine": self.judge.name,
+            "evaluation_cases": self.evaluation_cases,
+            "evaluation_first_seed": self.evaluation_first_seed,
+            "threat": self.threat,
+            "cell_m": self.cell_m if is_own else None,
+            "cells": self.cells if is_own else None,
+        }
+
 
 class _Arguments(TrainingSettings):
     """The content of `args.yml`."""

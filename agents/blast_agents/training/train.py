@@ -22,7 +22,12 @@ from blast_agents.training.agent import (
 from blast_agents.training.callbacks import ValidationCallback
 from blast_agents.training.cases import Selection
 from blast_agents.training.environments import make_environments
-from blast_agents.training.evaluations import EvaluationRow, learning_curve, read_evaluations
+from blast_agents.training.evaluations import (
+    EvaluationRow,
+    check_judging,
+    learning_curve,
+    read_evaluations,
+)
 from blast_agents.training.hyperparameters import Hyperparameters
 from blast_agents.training.imitation import imitate_rules
 from blast_agents.training.run_folder import (
@@ -104,7 +109,8 @@ def resume(
         progress: Called with the share of the steps that is done.
 
     Raises:
-        BlastEnvError: If the folder is not a run folder, is damaged, or has another scenario.
+        BlastEnvError: If the folder is not a run folder, is damaged, or has another scenario; or if
+            its settings of evaluations are others than those of the evaluations that it has.
     """
     folder = RunFolder(Path(run))
     configuration = folder.configuration()
@@ -116,6 +122,7 @@ def resume(
     if configuration.settings.scenario in FAMILIES:
         source = scenario_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
+    check_judging(read_evaluations(folder.evaluations), configuration.settings, folder.path)
     selection = Selection.of(configuration.settings, source)
     folder.clear_temporaries()
     return _Run(folder, configuration, source, selection).go_on(progress)
