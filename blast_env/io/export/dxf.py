@@ -4,7 +4,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, inf
+from math import floor, inf, sqrt
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -14,6 +14,7 @@ from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.io.export.bill import MODULE, LayoutPlan, stock_of
+from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS
 from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
@@ -25,14 +26,12 @@ from blast_env.values import letters
 with import_extra("export", "DXF files"):
     from ezdxf import units
     from ezdxf.document import Drawing
+    from ezdxf.entities.dxfgfx import DXFGraphic
     from ezdxf.enums import MTextEntityAlignment, TextEntityAlignment
     from ezdxf.filemanagement import new
     from ezdxf.layouts.layout import Modelspace
 
 VERSION: Final = "R2010"
-
-APPLICATION: Final = "BLAST_ENV"
-"""Application name of the extended data with the identifier of a module's outline."""
 
 CLEARANCE_LAYER: Final = "CLEARANCE"
 NOTES_LAYER: Final = "NOTES"
@@ -206,7 +205,7 @@ def _words_inside(feature: Feature) -> str:
 
 def _text_inside(feature: Feature, height_m: float) -> Text:
     """Return a text along the middle of a feature, as high as fits."""
-    text, outline = _words_inside(feature), feature.bounds_m
+    text, outline = _words_inside(feature), _room_m(feature)
     width_m, depth_m = outline.right - outline.left, outline.top - outline.bottom
     signs = _SIGN_WIDTH * len(text)
     upright = depth_m > width_m and signs * height_m > width_m
@@ -214,6 +213,20 @@ def _text_inside(feature: Feature, height_m: float) -> Text:
     piece_m = MODULE_SIDE_M / 2.0 if feature.kind is Kinds.BARRIER else height_m
     fitting_m = min(height_m, piece_m, 0.6 * short_m, 0.95 * long_m / signs)
     return Text(text, feature, outline.centre, fitting_m, upright)
+
+
+def _room_m(feature: Feature) -> Rectangle:
+    """Return the rectangle around a feature; a square within it if its middle is not in it.
+
+    A name in a courtyard or a notch would be that of another building.
+    """
+    outline = feature.bounds_m
+    area = shapely.Polygon(feature.places_m, feature.holes_m)
+    if shapely.contains_xy(area, *outline.centre):
+        return outline
+    radius = shapely.maximum_inscribed_circle(area)  # a line from its middle
+    x, y = radius.coords[0]
+    return Rectangle(x, y, x, y).grown(radius.length / sqrt(2.0))
 
 
 def wrapped(lines: Sequence[str], characters: int) -> list[str]:
@@ -285,12 +298,13 @@ def _draw(space: Modelspace, feature: Feature) -> None:
     attributes = {"layer": layer_name(feature.kind)}
     places = feature.places_m
     if len(places) == 1:
-        space.add_point(places[0], attributes)
+        _describe(space.add_point(places[0], attributes), feature)
     elif len(places) == 2:
-        space.add_line(*places, attributes)
+        _describe(space.add_line(*places, attributes), feature)
     else:
         for ring in feature.rings_m:
             outline = space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
+            _describe(outline, feature)
             outline.dxf.elevation = feature.base_m
             height_m = feature.properties.get("height_m")
             if isinstance(height_m, float):
@@ -298,6 +312,13 @@ def _draw(space: Modelspace, feature: Feature) -> None:
             if feature.kind is Kinds.BARRIER:
                 texts = [(_STRING, text) for text in _barrier_texts(feature)]
                 outline.set_xdata(APPLICATION, texts)
+
+
+def _describe(entity: DXFGraphic, feature: Feature) -> None:
+    """Give the place of a charge its mass, height and weight, which no layer says."""
+    if feature.kind is Kinds.CHARGE_PLACE:
+        said = (f"{key}={feature.properties[key]}" for key in CHARGE_KEYS)
+        entity.set_xdata(APPLICATION, [(_STRING, text) for text in said])
 
 
 def _barrier_texts(feature: Feature) -> list[str]:

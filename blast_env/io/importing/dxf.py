@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.options import UNITS_M
+from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, UNITS_M
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,
@@ -335,7 +335,7 @@ class _Drawn:
 
     def _features(self, entity: DXFEntity, layer: str, place: str) -> Iterator[MapFeature]:
         """Yield the features of a simple entity: several if it is a body of several heights."""
-        tags: dict[str, str | float | bool] = {"layer": layer}
+        tags: dict[str, str | float | bool] = {"layer": layer, **_own_data(entity)}
         if _is_hidden(entity):
             yield MapFeature(_NOWHERE, tags, place, _HIDDEN)
         elif isinstance(entity, Text | MText):
@@ -463,6 +463,14 @@ def _is_hidden(entity: DXFEntity) -> bool:
     return bool(entity.dxf.get("invisible", 0)) or (
         isinstance(entity, Attrib) and entity.is_invisible
     )
+
+
+def _own_data(entity: DXFEntity) -> dict[str, str]:
+    """Return what a drawing of blast-env says of a place of a charge."""
+    if not entity.has_xdata(APPLICATION):
+        return {}
+    pairs = (str(value).partition("=") for _, value in entity.get_xdata(APPLICATION))
+    return {key: value for key, _, value in pairs if key in CHARGE_KEYS}
 
 
 def _rise(entity: DXFEntity) -> FloatArray:

@@ -1,5 +1,6 @@
 """Reading of GeoJSON, RFC 7946 or the older form with a `crs` member."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +18,9 @@ LOCAL: Final = "local"
 """Reference system of coordinates in metres without a place on the Earth."""
 
 _LOCAL_WORDS: Final = "local site metres"  # in exports of a site without a georeference
+_DRAWING_UNIT: Final = re.compile(r"of the drawing .* in units of (\d[\d.e+-]*) m\b")
+"""The coordinates of exports of a site from a drawing."""
+
 _KINDS: Final = (
     *("Point", "MultiPoint", "LineString", "MultiLineString"),
     *("Polygon", "MultiPolygon", "GeometryCollection"),
@@ -36,6 +40,9 @@ def read_geojson(site_map: SiteMap, document: Mapping[str, Any]) -> None:
     for index in range(len(listed)):
         item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
         site_map.add(_feature(path, f"features[{index}]", item))
+    unit = _DRAWING_UNIT.search(str(document.get("coordinate_system", "")))
+    if unit is not None and options.crs is None:
+        site_map.unit_m = float(unit[1])
     crs = _crs(path, document) if options.crs is None else options.crs
     site_map.crs = None if crs == LOCAL else crs
 
@@ -86,7 +93,8 @@ def _crs(path: Path, document: Mapping[str, Any]) -> str:
 
     Exports of a site without a place on the Earth are `local`.
     """
-    if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
+    words = str(document.get("coordinate_system", ""))
+    if _LOCAL_WORDS in words or _DRAWING_UNIT.search(words):
         return LOCAL
     member = document.get("crs")
     if member is None:

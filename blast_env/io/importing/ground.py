@@ -3,7 +3,7 @@
 Areas of the map become modules, and these few rectangles.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from math import dist
@@ -43,6 +43,7 @@ _AREA_BLOCK: Final = 4  # modules: scale of the blocks of an area, per m of tole
 _LEAST_LENGTH_M: Final = 1.0
 _CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
 _DIGITS: Final = 3
+_WEIGHTS: Final = (1e-6, 1e6)
 _BUILT_OVER: Final = "places of charges that are built over, or too near to a building or border"
 _POINT_SHARE_M: Final = 5.0
 _AT_MOUTH_M: Final = 0.5
@@ -114,15 +115,35 @@ def _fewest(
     """Return the sources of things with their places, in the finest form of at most `most`."""
     for tolerance_m in _SIMPLER_M:
         sources = [
-            (thing.place, source | {"tnt_kg": thing.tnt_kg or site.options.tnt_kg})
+            (thing.place, source)
             for thing in things
-            for source in _with_mouths(
-                list(_sources(site, thing, free, tolerance_m)), mouths.get(thing.place, ())
+            for source in _charged(
+                site,
+                thing,
+                _with_mouths(
+                    list(_sources(site, thing, free, tolerance_m)), mouths.get(thing.place, ())
+                ),
             )
         ]
         if len(sources) <= most:
             break
     return sources
+
+
+def _charged(
+    site: SitePlacement, thing: Thing, sources: Iterable[dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the sources of a thing with its mass and height; together they have its weight."""
+    charge = {"tnt_kg": thing.tnt_kg or site.options.tnt_kg}
+    charge |= {"height_m": thing.above_m} if thing.above_m else {}
+    own = list(sources)
+    whole = sum(source["weight"] for source in own)
+    for source in own:
+        share = {}
+        if thing.weight is not None:
+            weight = thing.weight * source["weight"] / whole
+            share = {"weight": float(np.clip(weight, *_WEIGHTS))}
+        yield source | charge | share
 
 
 def _with_mouths(

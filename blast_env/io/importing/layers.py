@@ -1,6 +1,7 @@
 """Reading of layers of GeoPackage, shapefile, FlatGeobuf and KML by pyogrio, which has GDAL."""
 
 import glob
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, named
 from blast_env.io.importing.geojson import LOCAL
+from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.properties import tags_of
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
@@ -25,12 +27,19 @@ from blast_env.io.importing.site_map import (
 _TAG_NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {
         **dict.fromkeys(("building:l", "building_l"), "building:levels"),
+        **dict.fromkeys(("building:h", "building_h"), "building:height"),
+        **dict.fromkeys(("building:p", "building_p"), "building:part"),
+        **dict.fromkeys(("measuredHe", "measured_h"), "measuredHeight"),
         **dict.fromkeys(("roof:heigh", "roof_heigh"), "roof:height"),
         **dict.fromkeys(("roof:level", "roof_level"), "roof:levels"),
         "Name": "name",
     }
 )
 """Tags by other names: a shapefile cuts names after ten letters, KML has a capital."""
+
+_LEVELS: Final = "building:levels"
+_NUMBERED: Final = re.compile(r"building[:_]?\d")
+_TWINS: Final = "storeys by a name that a shapefile has cut, maybe those below the ground"
 
 _COMPANIONS: Final = (".dbf", ".shx")
 """Files that a shapefile cannot do without; its `.prj` is missed where it is needed."""
@@ -60,6 +69,7 @@ def read_layers(site_map: SiteMap) -> None:
         if geometries is None or not len(geometries):
             continue  # a table without places, or an empty layer
         systems[name] = meta["crs"]
+        _check_names(site_map, meta)
         for feature in _features(name if len(names) > 1 else "", meta, geometries, columns):
             site_map.add(feature)
     if site_map.features:
@@ -94,7 +104,7 @@ def _features(
     layer: str, meta: Mapping[str, Any], geometries: Any, columns: Any
 ) -> Iterator[MapFeature]:
     """Yield the features of a layer; one without a geometry is lost."""
-    fields = [_TAG_NAMES.get(str(name), str(name)) for name in meta["fields"]]
+    fields = _tags_of_fields(meta)
     for number, (given, *values) in enumerate(zip(geometries, *columns, strict=True)):
         place = f"{layer or 'features'}[{number}]"
         properties = {
@@ -109,6 +119,23 @@ def _features(
             yield MapFeature(shapely.Point(), tags, place, "features without a geometry")
         else:
             yield MapFeature(geometry, tags, place)
+
+
+def _tags_of_fields(meta: Mapping[str, Any]) -> list[str]:
+    return [_TAG_NAMES.get(str(name), str(name)) for name in meta["fields"]]
+
+
+def _check_names(site_map: SiteMap, meta: Mapping[str, Any]) -> None:
+    """Enter storeys of a shapefile with several names that are equal when cut.
+
+    GDAL cuts `building:levels` and `building:levels:underground` to `building_l`, in the order of
+    the fields, and numbers the second: `building_1`.
+    """
+    names = [str(name) for name in meta["fields"]]
+    twins = [name for name in names if _NUMBERED.fullmatch(name)]
+    if twins and _LEVELS not in names and _LEVELS in _tags_of_fields(meta):
+        detail = f"beside {', '.join(map(named, twins))}"
+        site_map.ledger.add(Fate.GUESSED, _TWINS, site_map.path.name, detail=detail)
 
 
 def _plain(value: Any) -> str | int | float | bool | None:

@@ -19,6 +19,12 @@ UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
 )
 """Lengths of units in metres, by the names that options take."""
 
+APPLICATION: Final = "BLAST_ENV"
+"""Application name of the extended data of a DXF file of blast-env."""
+
+CHARGE_KEYS: Final = ("tnt_kg", "above_ground_m", "weight")
+"""What a file of blast-env says of a place of a charge: mass, height above the ground, weight."""
+
 _WORDS: Final[Mapping[str, float]] = MappingProxyType(
     {
         **UNITS_M,

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.errors import BlastEnvError, named, quoted, value_text
 from blast_env.io.importing.heights import HeightReader
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.options import length_m
+from blast_env.io.importing.options import CHARGE_KEYS, length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
@@ -42,6 +42,8 @@ class Thing:
         height_m: Its height, m, if the source has one.
         protected: Whether the source marks it as protected.
         tnt_kg: Mass of a charge there, if the source has one.
+        above_m: Its height above the ground, m, in files of blast-env.
+        weight: Its weight among all places, in files of blast-env; `None` without one.
         kind: The value of `building` or `man_made`, in files of blast-env its kind, or the layer of
             a drawing; `roof` of a building without walls.
         part_of: The building of which it is a part: its place in the file, or its name in files of
@@ -77,6 +79,8 @@ class Thing:
     is_levelled: bool = False
     ground_m: float | None = None
     fault: str = ""
+    above_m: float = 0.0
+    weight: float | None = None
 
     @property
     def is_line(self) -> bool:
@@ -129,6 +133,7 @@ class Selector:
         return fnmatchcase(str(value).lower(), self.pattern.lower())
 
 
+_CHARGE_PLACE: Final = "charge_place"
 _OWN_STRUCTURES: Final = ("structure", "protected_structure", "terrace")
 
 _KINDS: Final[Mapping[str, Role]] = MappingProxyType(
@@ -139,7 +144,7 @@ _KINDS: Final[Mapping[str, Role]] = MappingProxyType(
         "terrace": Role.BUILDING,
         "build_zone": Role.ZONE,
         "keep_out": Role.KEEP_OUT,
-        "charge_place": Role.CHARGE,
+        _CHARGE_PLACE: Role.CHARGE,
     }
 )
 """Roles of the kinds, and of the layers in lower case, in files of blast-env."""
@@ -343,6 +348,10 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
     if "tnt_kg" in tags and role is Role.CHARGE and not tnt_kg:
         kind, detail = "masses that cannot be read, --tnt-kg", value_text(tags["tnt_kg"])
         ledger.add(Fate.GUESSED, kind, feature.place, detail=f"tnt_kg is {detail}")
+    above_m, weight = (
+        length_m(tags.get(key, "")) if role is Role.CHARGE and own == _CHARGE_PLACE else None
+        for key in CHARGE_KEYS[1:]
+    )
     return Thing(
         role=role,
         geometry=feature.geometry,
@@ -363,6 +372,8 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         ground_m=feature.ground_m,
         is_part=_is_part(tags),
         fault=_fault(feature, role, has_layers),
+        above_m=above_m or 0.0,
+        weight=weight or None,
     )
 
 

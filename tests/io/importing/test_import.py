@@ -3,12 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import osmium
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pyproj import Transformer
 
 from blast_env.errors import BlastEnvError
@@ -26,6 +29,7 @@ from blast_env.site import (
     load_scenario,
     save_scenario,
 )
+from tests import builders
 from tests.io.importing.found import imported
 from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 
@@ -181,6 +185,51 @@ def test_what_is_exported_can_be_imported_again(block: SiteImport, tmp_path: Pat
         assert getattr(here, key) == pytest.approx(getattr(there, key), abs=1e-8)  # a millimetre
 
 
+KILOGRAMS = st.floats(0.01, 1e4)
+HEIGHTS_M = st.sampled_from([0.0, 1.5, 2.25])
+PLACES = [
+    {"kind": "point", "position_m": [3.0, 3.0]},
+    {"kind": "segment", "start_m": [5.0, 3.0], "end_m": [30.0, 3.0]},
+    {"kind": "rectangle", "corner_m": [5.0, 5.0], "size_m": [20.0, 2.0]},
+]
+
+
+@pytest.mark.parametrize("suffix", [".geojson", ".dxf"])
+@settings(max_examples=10)
+@given(data=st.data())
+def test_charges_and_courtyards_that_are_exported_can_be_imported_again(
+    suffix: str, data: st.DataObject
+) -> None:
+    charges = [
+        place
+        | {
+            "tnt_kg": data.draw(KILOGRAMS),
+            "height_m": data.draw(HEIGHTS_M),
+            "weight": data.draw(st.floats(0.01, 100.0)),
+        }
+        for place in PLACES
+    ]
+    yard = [[16.0, 14.0], [24.0, 14.0], [24.0, 22.0], [16.0, 22.0]]
+    court = {
+        "kind": "polygon",
+        "name": "court",
+        "outline_m": [[12.0, 10.0], [28.0, 10.0], [28.0, 26.0], [12.0, 26.0]],
+        "courtyards_m": [yard],
+        "height_m": 6.0,
+        "protected": data.draw(st.booleans()),
+    }
+    lodge = builders.block("lodge", 30.0, 10.0, 8, 8, height_m=3.0, protected=True)
+    site = builders.site("s", (40.0, 30.0), charges, court, lodge)
+    with TemporaryDirectory() as folder:
+        path = export_layout(LayoutPlan(site, ()), Path(folder, f"site{suffix}"))
+        again = import_site(path).scenario
+    for key in ("tnt_kg", "height_m", "weight"):
+        mine, new = ([getattr(source, key) for source in own.charge] for own in (site, again))
+        assert new == pytest.approx(mine, rel=1e-9)
+    areas = {structure.name: 0.25 * structure.modules for structure in again.structures}
+    assert areas == {"court": 16.0**2 - 8.0**2, "lodge": 16.0}
+
+
 @pytest.mark.usefixtures("apart")
 def test_map_in_another_reference_system_goes_back_to_it(tmp_path: Path) -> None:
     """The older form of GeoJSON says which in its member crs; so does what is written."""
@@ -211,9 +260,13 @@ def test_map_in_another_reference_system_goes_back_to_it(tmp_path: Path) -> None
 
 def test_drawing_goes_back_to_its_own_millimetres(tmp_path: Path) -> None:
     site = import_site(BLOCK.with_suffix(".dxf"), replace(HALL, **LAYERS))
-    content = json.loads(
-        export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson").read_text()
-    )
+    path = export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson")
+    content = json.loads(path.read_text())
+    again = import_site(path).scenario
+    assert again.site == site.scenario.site
+    assert len(again.structures) == len(site.scenario.structures)
+    assert isinstance(again.georeference, DrawingGeoreference)
+    assert again.georeference.metres_per_unit == 0.001
     assert "units of 0.001 m" in content["coordinate_system"]
     zone = next(
         feature for feature in content["features"] if feature["properties"]["kind"] == "build_zone"

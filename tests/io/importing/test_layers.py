@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry import shape
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, SiteImport, import_site
+from blast_env.io.importing import Fate, ImportOptions, SiteImport, import_site
 
 MARKET = Path("docs/data/market_street.geojson")
 OPTIONS = ImportOptions(protect=("Town Hall",))
@@ -203,3 +203,48 @@ def test_what_is_no_such_file_is_a_plain_error(suffix: str, tmp_path: Path) -> N
     with pytest.raises(BlastEnvError, match="cannot be read as") as caught:
         import_site(path)
     assert "DRIVER" not in str(caught.value)
+
+
+def shapefile(folder: Path, **fields: Any) -> Path:
+    """Write two houses with these fields, whose names GDAL cuts after ten letters."""
+    path = folder / "houses.shp"
+    houses = [shapely.box(x, 5.5e6, x + 20.0, 5.5e6 + 20.0) for x in (500_000.0, 500_040.0)]
+    columns = {"building": "yes", "name": "House", **fields}
+    with pytest.warns(RuntimeWarning, match="Normalized"):
+        pyogrio.raw.write(
+            path,
+            shapely.to_wkb(np.array(houses)),
+            [np.array([value] * 2, dtype=object) for value in columns.values()],
+            [*columns],
+            geometry_type="Polygon",
+            crs="EPSG:25832",
+        )
+    return path
+
+
+@pytest.mark.parametrize(
+    ("fields", "height_m"),
+    [
+        ({"measuredHeight": "15"}, 15.0),
+        ({"building:height": "15"}, 15.0),
+        ({"building_height": "15"}, 15.0),
+        ({"building:levels": "5"}, 15.0),
+    ],
+)
+def test_heights_whose_names_a_shapefile_has_cut_are_read(
+    fields: dict[str, str], height_m: float, tmp_path: Path
+) -> None:
+    options = ImportOptions(protect=("House",), charge_at=((500_010.0, 5.5e6 - 5.0),))
+    site = import_site(shapefile(tmp_path, **fields), options)
+    assert {building.height_m for building in site.buildings} == {height_m}
+    assert not site.ledger.of(Fate.GUESSED)
+
+
+def test_storeys_that_may_be_cellars_are_a_guess(tmp_path: Path) -> None:
+    """Both are `building_l` when cut, and the first in the file has that name."""
+    fields = {"building:levels:underground": "2", "building:levels": "5"}
+    options = ImportOptions(protect=("House",), charge_at=((500_010.0, 5.5e6 - 5.0),))
+    site = import_site(shapefile(tmp_path, **fields), options)
+    (guess,) = site.ledger.of(Fate.GUESSED)
+    assert "below the ground" in guess.kind
+    assert "building_1" in guess.detail
