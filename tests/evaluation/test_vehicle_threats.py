@@ -89,3 +89,24 @@ def test_a_search_meets_the_worst_places_first() -> None:
     assert 0 < len(vehicles) < 12
     assert [threat.charge for threat in threats[: len(vehicles)]] == vehicles
     assert [vehicle.rank for vehicle in vehicles] == list(range(len(vehicles)))
+
+
+def test_a_reduction_is_flagged_where_only_the_load_without_the_barrier_is_out_of_range() -> None:
+    """Without a barrier the vehicle comes too near; the flags had been of the other load alone."""
+    site = gate_site(vehicle_document(tnt_kg=20.0))
+    engine = GasEngine(border_m=0.0, cell_m=0.25)
+    found = evaluate_layout(site, POSTS, seeds=[0], engine=engine)
+    own, bare = (
+        found.blasts.records[side][0].loads.structures[0]
+        for side in (found.blasts.judged, found.blasts.unprotected)
+    )
+    assert own.in_range
+    assert not bare.in_range
+    assert not found.in_range
+    assert found.table["threats_in_range"].item() == 0
+    assert found.threat_table["in_range"].tolist() == [False]
+    assert found.table["validation"].item() == "outside"
+    assert found.table["reason"].item().startswith("without a barrier, scaled distance 0.")
+    (note,) = (note for note in found.notes if "outside the validated range" in note)
+    assert "hut: 1 of 1 threats" in note
+    assert "without a barrier, scaled distance 0." in note

@@ -5,7 +5,7 @@ case in which no threat causes a load without a barrier (`check_something_arrive
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from operator import attrgetter
@@ -21,7 +21,7 @@ from blast_env.evaluation.engines.bays import VALIDATION_COLUMNS
 from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.questions.grid_error import GridError, impulse_of
 from blast_env.evaluation.record import BlastLoads, BlastRecord, StructureLoad, on_buildings
-from blast_env.evaluation.validation import worst_validation
+from blast_env.evaluation.validation import Validation, worst_validation
 from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_site import build_site
@@ -68,7 +68,7 @@ STRUCTURE_COLUMNS: Final = (
         "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
     ),
     Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
-    Column("threats_in_range", "", "threats that the calibration was made for"),
+    Column("threats_in_range", "", "threats in the checked or calibrated range on both sides"),
     *VALIDATION_COLUMNS,
 )
 
@@ -83,7 +83,7 @@ THREAT_COLUMNS: Final = (
     Column("load", "", "load in the scenario's objective, with the barrier"),
     Column("unprotected_load", "", "the same without it"),
     Column("reduction", "", "of that load"),
-    Column("in_range", "", "whether the calibration was made for this threat"),
+    Column("in_range", "", "whether it is in the checked or calibrated range on both sides"),
     Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
     Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
 )
@@ -96,7 +96,7 @@ def _structure_row(
     # The first layout is the empty site, the last one that in question.
     sides = [[load_of(part) for part in own] for own in blasts.records.values()]
     without, loads = sides[0], sides[-1]
-    first, worst = loads[0], worst_validation(load.validation for load in loads)
+    first, worst = loads[0], _worst_of_both(loads, without)
 
     def impulse_of(record: BlastRecord) -> float:
         return load_of(record).impulse_pa_s
@@ -117,7 +117,9 @@ def _structure_row(
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
         "reduction_error": of_reduction,
-        "threats_in_range": sum(load.in_range for load in loads),
+        "threats_in_range": sum(
+            one.in_range and other.in_range for one, other in zip(loads, without, strict=True)
+        ),
         "validation": worst.status.label,
         "reason": worst.reason,
     }
@@ -130,6 +132,18 @@ def _structure_row(
         row[f"{side}impulse_error_pa_s"] = off * mean_pa_s
         row[f"{side}peak_pa"] = float(np.mean(peaks))
     return row
+
+
+def _worst_of_both(loads: Sequence[StructureLoad], without: Sequence[StructureLoad]) -> Validation:
+    """Return the worst validation status of a structure's loads with a barrier and without one.
+
+    A reduction rests on both. A vehicle may be nearer without a barrier.
+    """
+    own, bare = (worst_validation(load.validation for load in side) for side in (loads, without))
+    return own if own.status >= bare.status else bare._replace(reason=f"{_BARE}{bare.reason}")
+
+
+_BARE: Final = "without a barrier, "
 
 
 def charge_values(charge: Charge) -> dict[str, object]:
@@ -154,7 +168,8 @@ class ThreatOutcome:
         unprotected_peak_pa: The same without it, Pa.
         load: Load of the protected structures with the barrier, in the unit of the objective.
         unprotected_load: The same without it.
-        in_range: Whether the threat is in the range of the calibration.
+        in_range: Whether the threat is in the checked or calibrated range with the barrier and
+            without it.
     """
 
     threat: LoadCase
@@ -189,7 +204,7 @@ class ThreatOutcome:
             unprotected_peak_pa=unprotected.protected_peak_pa,
             load=loads.load(counts),
             unprotected_load=unprotected.load(counts),
-            in_range=loads.in_range,
+            in_range=loads.in_range and unprotected.in_range,
         )
 
     @property
@@ -277,9 +292,9 @@ class Evaluation:
 
     @property
     def in_range(self) -> bool:
-        """Whether all blasts are in the range of the calibration."""
-        own = (record for part in self.every for record in part.records[part.judged])
-        return all(other.loads.in_range for other in own)
+        """Whether all blasts are in the checked or calibrated range."""
+        sides = (part.records[name] for part in self.every for name in _sides(part))
+        return all(record.loads.in_range for side in sides for record in side)
 
     @property
     def _is_mean(self) -> bool:
@@ -538,21 +553,34 @@ class Evaluation:
                 f"{name}: no bay of its facade has a load: its response counts as 0"
                 for name in self._without_bays
             )
-        checked = self.engine.validated_range
+        notes += self._outside
         own = (record.loads.structures for record in self.blasts.records[self.blasts.judged])
-        if self.engine.needs_calibration:
-            checked = f"the range of calibration {self.calibration!r}"
         for of_structure in zip(*own, strict=True):
-            outside = [load for load in of_structure if not load.in_range]
-            if outside:
-                notes.append(
-                    f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
-                    f"{checked}, e.g. {'; '.join(outside[0].notes)}"
-                )
             worst = max(of_structure, key=attrgetter("unloaded_m2"))
             if words := worst.unloaded_words:
                 notes.append(f"{worst.name}: {words}")
         return tuple(notes)
+
+    @property
+    def _outside(self) -> Iterator[str]:
+        """The structures with threats outside the range, with or without the barrier."""
+        checked = self.engine.validated_range
+        if self.engine.needs_calibration:
+            checked = f"the range of calibration {self.calibration!r}"
+        of_threats = [
+            [{load.name: load for load in record.loads.structures} for record in pair]
+            for pair in self.blasts.pairs(self.blasts.judged)
+        ]
+        for name in of_threats[0][0]:
+            pairs = [(own[name], bare[name]) for own, bare in of_threats]
+            outside = [pair for pair in pairs if not all(load.in_range for load in pair)]
+            if outside:
+                own, bare = (dict.fromkeys(load.notes) for load in outside[0])
+                why = [*own, *(f"{_BARE}{note}" for note in bare if note not in own)]
+                yield (
+                    f"{name}: {len(outside)} of {len(self.threats)} threats are outside {checked}, "
+                    f"e.g. {'; '.join(why)}"
+                )
 
     @property
     def _without_bays(self) -> tuple[str, ...]:
