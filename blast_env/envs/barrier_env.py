@@ -230,7 +230,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, Any]):
                 from that of the representative one.
         """
         super().reset(seed=seed)
-        self.episodes.begin([0], [self.np_random], ResetOptions.from_mapping(options))
+        self.episodes.begin([0], [self.np_random], [ResetOptions.from_mapping(options)])
         self._show()
         return self._observation(), self.episodes.information(0)
 

@@ -393,14 +393,17 @@ class Episodes:
         self._of_turns = None if isinstance(reward, EndReward) else reward
 
     def begin(
-        self, indices: Sequence[int], rngs: Sequence[np.random.Generator], options: ResetOptions
+        self,
+        indices: Sequence[int],
+        rngs: Sequence[np.random.Generator],
+        options: Sequence[ResetOptions],
     ) -> None:
         """Draw episodes; options do not change the amount drawn from the random streams.
 
         Args:
             indices: The episodes; at first all of them in their order.
             rngs: The random numbers of each of them.
-            options: The fixed parts.
+            options: The fixed parts of each of them.
 
         Raises:
             LayoutError: If the layout of the options does not fit the build zone.
@@ -410,8 +413,8 @@ class Episodes:
         # 1. All are drawn first: what is refused leaves every episode as it was.
         begun: dict[int, Episode] = {}
         together: dict[int, tuple[_Site, LayoutState, list[int]]] = {}
-        for index, rng in zip(indices, rngs, strict=True):
-            start, episode = self._drawn(rng, options)
+        for index, rng, own in zip(indices, rngs, options, strict=True):
+            start, episode = self._drawn(rng, own)
             begun[index] = episode
             together.setdefault(id(start), (episode.site, start, []))[2].append(index)
         # 2. Those that begin with the empty layout of their site are begun together.

@@ -86,19 +86,38 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        options: dict[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode in every environment.
 
         Args:
             seed: Seed of the first environment, the next one has the next seed; or one of each.
             options: Those of `BlastBarrierEnv.reset`, for all environments, and `reset_mask`, the
-                mask of the environments to reset (environments,).
+                mask of the environments to reset (environments,). Or a list of those of each.
 
         Raises:
             UnknownNameError: If there is no such option; the message has the nearest one.
-            BlastEnvError: If the seed or an option is invalid; all episodes are as they were then.
+            BlastEnvError: If the seed or an option is invalid; all episodes, and the seeds of the
+                next ones, are as they were then.
         """
+        seeds = self._given_seeds(seed)
+        given, mask = self._given_options(options)
+        chosen = _indices(mask)
+        before = self._rngs[:], self._seeds[:]
+        try:
+            for index in chosen:
+                if seeds[index] is not None:
+                    self._rngs[index], self._seeds[index] = seeding.np_random(seeds[index])
+            self._seed_missing()
+            self._begin(chosen, given)
+        except Exception:  # whatever refuses it, also an engine or a source of one's own
+            self._rngs, self._seeds = before
+            raise
+        self._over[chosen] = False
+        return self._observe(self._all), self._information(chosen)
+
+    def _given_seeds(self, seed: Any) -> list[int | None]:
+        """Return the seed of each environment; integers of NumPy are integers, too."""
         count = self.num_envs
         seeds = [None] * count if seed is None else seed
         if isinstance(seeds, int | np.integer):
@@ -109,23 +128,28 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             )
         if len(seeds) != count:
             raise BlastEnvError(f"seed has {len(seeds)} values, must have num_envs = {count}")
+        return [int(own) if isinstance(own, np.integer) else own for own in seeds]
+
+    def _given_options(self, options: Any) -> tuple[list[ResetOptions], BoolArray]:
+        """Return the options of each environment, and the mask of those to reset."""
+        count = self.num_envs
+        everyone = np.ones(count, dtype=np.bool_)
+        if isinstance(options, list | tuple):
+            if len(options) != count:
+                raise BlastEnvError(
+                    f"options has {len(options)} values, must have {count}, of each"
+                )
+            return [ResetOptions.from_mapping(own) for own in options], everyone
         if not isinstance(options, Mapping | None):
             raise BlastEnvError(f"options is {value_text(options)}, must be a mapping")
         given = dict(options or {})
-        mask = np.asarray(given.pop("reset_mask", np.ones(count, dtype=np.bool_)))
+        mask = np.asarray(given.pop("reset_mask", everyone))
         if mask.shape != (count,) or mask.dtype != np.bool_ or not (mask.all() or self._running):
             raise BlastEnvError(
                 f"reset_mask has shape {mask.shape} and type {mask.dtype}, must be ({count},) and"
                 " bool, and all True at first"
             )
-        chosen = _indices(mask)
-        for index in chosen:
-            if seeds[index] is not None:
-                self._rngs[index], self._seeds[index] = seeding.np_random(seeds[index])
-        self._seed_missing()
-        self._begin(chosen, ResetOptions.from_mapping(given))
-        self._over[chosen] = False
-        return self._observe(self._all), self._information(chosen)
+        return [ResetOptions.from_mapping(given)] * count, mask
 
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
@@ -174,7 +198,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         truncated = self._steps >= self._most_steps
         truncated[begun] = False
         self._over = terminated | truncated
-        self._begin(begun, ResetOptions())
+        self._begin(begun)
         self._over[begun] = False
         final: dict[str, Any] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -226,13 +250,14 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             )
         return given
 
-    def _begin(self, chosen: Sequence[int], options: ResetOptions) -> None:
-        """Begin an episode in some environments; the first time in all."""
+    def _begin(self, chosen: Sequence[int], options: Sequence[ResetOptions] = ()) -> None:
+        """Begin an episode in some environments, with the options of each; at first in all."""
         if not chosen:
             return
         chosen = chosen if self._running else self._all
         rngs = [rng for index in chosen if (rng := self._rngs[index]) is not None]
-        self.episodes.begin(chosen, rngs, options)
+        own = [options[index] for index in chosen] if options else [ResetOptions()] * len(chosen)
+        self.episodes.begin(chosen, rngs, own)
         self._steps[chosen] = 0
         episodes = [self._running[index] for index in chosen]
         self._note(chosen, [episode.constants for episode in episodes])
@@ -264,7 +289,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
                 "final_info": self.episodes.information(index),
             }
             final = self._add_info(final, kept, index)
-        self._begin(over, ResetOptions())
+        self._begin(over)
         self._over[over] = False
         return final
 

@@ -184,3 +184,40 @@ def test_observations_that_are_kept_do_not_change() -> None:
         kept.append(observed)
         copies.append(observed.copy())
     assert same(kept, copies)
+
+
+def test_a_refused_reset_leaves_the_seeds_of_later_episodes() -> None:
+    """Else the episodes after it would be others than without it."""
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    envs = BlastBarrierVectorEnv(2, **chosen)
+    envs.reset(seed=1)
+    states = [generator.bit_generator.state for generator in envs.np_random]
+    wrong: list[tuple[Any, Any]] = [([5, -1], None), (5, {"charge_position_m": (-1.0, 0.0)})]
+    for seed, options in wrong:
+        with pytest.raises((BlastEnvError, gym.error.Error)):
+            envs.reset(seed=seed, options=options)
+        assert [generator.bit_generator.state for generator in envs.np_random] == states
+        assert envs.np_random_seed == (1, 2)
+
+
+def test_integers_of_numpy_are_seeds() -> None:
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    envs = BlastBarrierVectorEnv(2, **chosen)
+    expected, _ = envs.reset(seed=[3, 8])
+    assert same(envs.reset(seed=np.array([3, 8]))[0], expected)  # type: ignore[arg-type]
+    assert same(envs.reset(seed=[np.int64(3), np.int32(8)])[0], expected)
+
+
+def test_each_environment_has_options_of_its_own() -> None:
+    chosen: dict[str, Any] = {
+        "scenario": small_scenario(),
+        "engine": ThinEngine(),
+        "observation": "features",
+    }
+    options: list[dict[str, Any]] = [{"tnt_kg": 20.0}, {"layout": [(0, 0)]}, {}]
+    envs, one = BlastBarrierVectorEnv(3, **chosen), gym.make("BlastBarrier-v0", **chosen)
+    observed, _ = envs.reset(seed=4, options=options)
+    expected = [one.reset(seed=4 + index, options=own)[0] for index, own in enumerate(options)]
+    assert same([*observed], expected)
+    with pytest.raises(BlastEnvError, match="options has 2 values, must have 3"):
+        envs.reset(options=options[:2])

@@ -5,13 +5,17 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from blast_agents.training import BatchVecEnv
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import obs_as_tensor
+from stable_baselines3.common.vec_env import DummyVecEnv
 
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.site import Scenario
 from blast_env.surrogate import SurrogateEngine
 from tests.catalogue_sites import ITEMS
+from tests.envs.small import same, small_scenario
 from tests.libraries.ids import BARRIER_IDS, arguments
 from tests.office_park import office_park
 from tests.surrogate.test_surrogate import by_hand
@@ -103,3 +107,21 @@ def test_maskable_ppo_learns_by_item_and_block_in_a_zone_of_a_hundred_metres() -
         if ended:
             observation, info = env.reset()
     assert len(choices) == 3  # item, block and cell
+
+
+def test_a_batch_resets_as_other_vectors_do() -> None:
+    """With options of each environment, and the information of the episodes that follow."""
+    site: dict[str, Any] = {"scenario": small_scenario(), "observation": "features"}
+    site |= {"engine": SurrogateEngine(by_hand()), "action": "place"}
+    batch = BatchVecEnv(BlastBarrierVectorEnv(2, "Disabled", **site))
+    dummy = DummyVecEnv([lambda: gym.make("BlastBarrier-v0", **site)] * 2)
+    found: list[list[Any]] = []
+    for envs in (batch, dummy):
+        envs.seed(3)
+        envs.set_options([{"tnt_kg": 20.0}, {"layout": [(0, 0)]}])
+        own: list[Any] = [envs.reset(), envs.reset_infos[0]["blast_seeds"]]
+        finish = [batch.envs.finish, 1]
+        for _ in range(2):
+            own += [envs.step(np.array(finish))[0], envs.reset_infos[0]["blast_seeds"]]
+        found.append(own)
+    assert same(*found)

@@ -117,8 +117,8 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in every environment."""
-        options = self._options[0] or None
-        observations, infos = self.envs.reset(seed=self._drawn(self._seeds), options=options)
+        seeds = self._drawn(self._seeds)
+        observations, infos = self.envs.reset(seed=seeds, options=self._options)
         self.reset_infos = [_of_one(infos, index) for index in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
@@ -140,7 +140,9 @@ class BatchVecEnv(VecEnv):
                 own_infos[index]["terminal_observation"] = _of_one(observations, index)
         if ended.any():
             seeds = self._drawn([None] * self.num_envs, ended)
-            observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": ended})
+            observations, infos = self.envs.reset(seed=seeds, options={"reset_mask": ended})
+            for index in ended.nonzero()[0].tolist():
+                self.reset_infos[index] = _of_one(infos, index)
         return cast("VecEnvObs", observations), rewards.astype(np.float32), ended, own_infos
 
     def _drawn(
