@@ -413,8 +413,8 @@ class Episodes:
         # 1. All are drawn first: what is refused leaves every episode as it was.
         begun: dict[int, Episode] = {}
         together: dict[int, tuple[_Site, LayoutState, list[int]]] = {}
-        for index, rng, own in zip(indices, rngs, options, strict=True):
-            start, episode = self._drawn(rng, own)
+        for index, rng, fixed in zip(indices, rngs, options, strict=True):
+            start, episode = self._drawn(rng, fixed)
             begun[index] = episode
             together.setdefault(id(start), (episode.site, start, []))[2].append(index)
         # 2. Those that begin with the empty layout of their site are begun together.
