@@ -1,5 +1,6 @@
 """Episodes of placing, one or many at once: place, blast, observe, reward."""
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,7 +32,7 @@ from blast_env.envs.strategies import (
     Transition,
     check_size,
 )
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, check_loaded
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import (
@@ -339,6 +340,24 @@ def _outcome(
     }
 
 
+def _check_bare(episode: Episode, without_load: Sequence[str]) -> None:
+    """Refuse a site without a load; warn of one on which no layout is better than another.
+
+    Raises:
+        BlastEnvError: If no air touches a protected building.
+    """
+    load, scenario = episode.loads[()].load, episode.site.empty.scenario
+    if isnan(load):
+        check_loaded(episode.case, without_load)
+    if load == 0.0 and scenario.objective.target is not None:
+        warnings.warn(
+            f"{scenario.name}: by {episode.task.engine.name} the facades reach their target without"
+            " a barrier: every layout gets the same reward",
+            BlastEnvWarning,
+            stacklevel=2,
+        )
+
+
 @cache
 def _kernels() -> Any:
     from blast_env.envs import turn_kernels  # Numba takes long to import
@@ -623,8 +642,7 @@ class Episodes:
             own = [next(loads) for _ in episode.case.threats]
             episode.loads[layout] = Assessment.of(episode.case, layout, own)
             if not layout:
-                if isnan(episode.loads[()].load):
-                    check_loaded(episode.case, own[0].without_load)
+                _check_bare(episode, own[0].without_load)
                 _keep(episode.site.bare, episode.loads_key, episode.loads[()])
 
     def rewards(self, indices: Sequence[int]) -> FloatArray:

@@ -12,7 +12,7 @@ from gymnasium import spaces
 from blast_env.arrays import FloatArray
 from blast_env.envs.observable import Observable
 from blast_env.envs.strategies import Transition
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, BlastEnvWarning
 from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase, evaluate_layout
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
@@ -485,3 +485,18 @@ def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
 def test_more_realisations_are_refused() -> None:
     with pytest.raises(BlastEnvError, match="realisations is 2, must be 1: gas has no noise"):
         on_gas(realisations=2)
+
+
+def test_a_site_on_which_no_layout_pays_is_told_of() -> None:
+    """Guesses know one load for all bays of a facade, which reaches its target in `guard_post`."""
+    returns = []
+    for actions in ((), (0, 500)):
+        env = gym.make("BlastBarrier-v0", scenario="guard_post", engine="surrogate", action="place")
+        env.reset(seed=0)
+        paid = sum(float(env.step(np.int64(action))[1]) for action in actions)
+        with pytest.warns(BlastEnvWarning, match="guard_post: by surrogate the facades reach"):
+            _, reward, _, _, info = env.step(env.get_wrapper_attr("finish"))
+        assert np.isnan(info["reduction"])
+        assert bool(info["placed"]) == bool(actions)
+        returns.append(paid + float(reward))
+    assert returns[0] == returns[1]
