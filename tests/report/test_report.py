@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import blast_env
-from blast_env.answers import Number, Picture
+from blast_env.answers import Line, Number, Picture
 from blast_env.answers import report as reports
 from blast_env.answers.report import (
     Limit,
@@ -458,6 +458,21 @@ def test_details_come_from_a_file(tmp_path: Path) -> None:
         ReportDetails.read(path)
     with pytest.raises(BlastEnvError, match="marking has 201 characters"):
         ReportDetails(marking="x" * 201)
+
+
+def test_page_one_says_how_many_fixed_charges_the_verdict_leaves_out() -> None:
+    """As `assess` does: the worst by impulse were judged, and a verdict rests on damage."""
+    document = glazed_hut().model_dump(mode="json", exclude_none=True)
+    first = document["charge"][0]
+    others = [first | {"position_m": [2.0, y_m]} for y_m in (2.0, 5.0)]
+    site = Scenario.from_document(document | {"charge": [first, *others]}, "hut")
+    said = {}
+    for most in (2, 3):
+        options = StudyOptions(cells=(0.5, 0.5), places=1, items=False, most_threats=most)
+        document_of = report_document(Report(run_study(site, LAYOUT, options)))
+        texts = [part.text() for part in document_of.sections[1].parts if isinstance(part, Line)]
+        said[most] = [text for text in texts if "not among these" in text]
+    assert said == {2: ["not among these: 1 of the 3 fixed charges of the site"], 3: []}
 
 
 def test_a_barrier_that_adds_load_is_named(study: Study) -> None:

@@ -11,6 +11,7 @@ from blast_env.answers.document import (
     Section,
     Table,
     height_words,
+    left_out_words,
     lines,
     percent,
     without_facade_words,
@@ -72,6 +73,8 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
     if behind.is_asked:
         limited = [own.limit.building for own in behind.limited]
         yield from lines(without_facade_words(study.scenario, limited), "flag")
+        charges = [threat.charge for threat in study.threats]
+        yield from lines(left_out_words(study.scenario, charges), "flag")
     if behind.doubt:
         yield Line.of(f"Cells clip peaks: {behind.doubt}.")
     if behind.found.buildings:
