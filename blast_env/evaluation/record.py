@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from hashlib import sha256
 from itertools import accumulate
+from math import isnan
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
@@ -56,7 +57,8 @@ class StructureLoad:
         area_m2: Area of the counted walls, 0 if the load on them is not known; `None` where the
             engine has no areas.
         response: Response of its bays in the objective; `None` unless the objective is a response.
-        worst_damage: The largest damage of its bays, for the same objective.
+        worst_damage: The largest damage of its bays, for the same objective; NaN, as the response,
+            if no air touches the building.
         validation: Validation status of the load, with its reason.
         impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
         unloaded_m2: Area of its counted walls without a load, since pieces fill the gap before
@@ -200,7 +202,7 @@ class BlastLoads:
         """Return the loads with the response of given facades, without another blast.
 
         That of a structure of which no air touches a bay is 0, or NaN, as its load, if no air
-        touches the building.
+        touches the building; so is the damage.
 
         Raises:
             BlastEnvError: If the bays were not recorded.
@@ -213,7 +215,7 @@ class BlastLoads:
             own = [bay for bay in self.bays if bay.structure == load.name]
             response, most = structure_response(own, named, objective)
             if load.name in glazed and load.building in hidden:
-                response = np.nan
+                response = most = np.nan
             responded.append(replace(load, response=response, worst_damage=most))
         return replace(self, structures=tuple(responded))
 
@@ -229,8 +231,14 @@ class BlastLoads:
 
     @property
     def level(self) -> LevelOfProtection:
-        """The level of protection of the facades of the protected structures."""
-        return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
+        """The level of protection of the facades of the protected structures.
+
+        It is the lowest where one is not known, since no air touches a building.
+        """
+        damages = [load.worst_damage or 0.0 for load in self.protected]
+        if any(map(isnan, damages)):
+            return LevelOfProtection.BELOW_STANDARDS
+        return level_of(worst(damages))
 
     def are_for(self, scenario: AnyScenario) -> bool:
         """Return whether these can be the loads of a scenario.

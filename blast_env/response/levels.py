@@ -7,8 +7,12 @@ protection, from 1 medium, from 2 low, from 3 very low, from 4 to 5 none.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Final
 
 from blast_env.errors import UnknownNameError
+
+MOST_DAMAGE: Final = 5.0
+"""The largest damage."""
 
 
 class LevelOfProtection(IntEnum):

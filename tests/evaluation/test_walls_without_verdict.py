@@ -19,6 +19,8 @@ from blast_env.answers.report import Limit, Report, StudyOptions, report_documen
 from blast_env.benchmark import Definition, make
 from blast_env.cli import app
 from blast_env.design.search import DesignProblem, PopulationAnnealingSearch, RandomSearch
+from blast_env.design.search.advice import MeasureKind, advise
+from blast_env.design.search.advised import site_with_target
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.blasts import Blasts
@@ -261,6 +263,27 @@ def test_no_reward_is_paid_for_hiding_a_building(reward: str) -> None:
     assert np.isnan(info["impulse_pa_s"])
     assert info["reduction"] == 0.0
     assert paid == {"terminal": -1.0, "incremental": -1.0, "relative": 0.0}[reward]
+
+
+def test_a_hidden_building_has_no_high_level_of_protection() -> None:
+    """It has no bay that could be damaged: its level had been high, and its damage 0."""
+    scenario = site("other", objective={"kind": "response"})
+    env = gym.make("BlastBarrierGas-v0", scenario=scenario)
+    env.reset(seed=0, options={"layout": WALLS})
+    *_, info = env.step(env.get_wrapper_attr("finish"))
+    assert np.isnan(info["response"])
+    assert info["level_of_protection"] == "below standards"
+
+
+def test_no_advice_takes_a_hidden_building_for_one_without_damage(cache: Path) -> None:
+    scenario = site_with_target(site("other", "house"), LevelOfProtection.LOW, None, 10.0)
+    evaluator = BlastEvaluator(scenario, ENGINE, cache=cache)
+    problem = DesignProblem(evaluator, LoadCaseSet(scenario, (LoadCase(CHARGE),)))
+    found = advise(problem, MeasureKind.SHIELD, 4, begin_with=(WALLS,))
+    hiding = [trial for trial in found.tried if set(WALLS) <= {*trial.layout}]
+    assert hiding
+    assert all(trial.damage == 5.0 for trial in hiding)
+    assert not any(trial.worth <= found.worth for trial in hiding)
 
 
 def test_no_episode_ends_where_a_building_is_hidden_without_a_barrier() -> None:

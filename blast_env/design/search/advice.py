@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
-from math import inf
+from math import inf, isnan
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from blast_env.evaluation.questions.verdict import Verdict
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
-from blast_env.response.levels import worst
+from blast_env.response.levels import MOST_DAMAGE, worst
 from blast_env.rules import layouts_by_rule
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario
@@ -328,7 +328,11 @@ def _hardened(
             cost = sum(prices[name] for name in taken)
             if left is None or cost <= left:
                 layout = (*barrier, *map(Measure.named, taken))
-                worth, damage = problem.load(layout), _worst_damage(problem, layout)
+                worth = problem.load(layout)
+                if isnan(worth):  # pieces hide a building: such a layout is never the best
+                    found.append(LayoutTrial(inf, placement.cost + cost, MOST_DAMAGE, layout))
+                    continue
+                damage = _worst_damage(problem, layout)
                 # It reaches the target, but without the margin: worse than any that has it.
                 if worth <= 1.0 and damage >= damage_below:
                     worth = 1.0 + damage - damage_below + _TOO_LITTLE
