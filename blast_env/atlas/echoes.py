@@ -4,7 +4,8 @@ A wall that faces both the charge and the bay has an image of the charge behind 
 by the share of its zone (a bell around the way, as between obstacles) that meets the wall, by its
 distance and by its angle of incidence on the bay, both relative to those of the charge. Walls that
 face the bay's own wall are opposite it, those at a right angle to it are beside it, on its left or
-on its right. A wave that goes to and fro between walls has its first images as a measure.
+on its right; one at another angle is so by the squares of its sine and cosine. A wave that goes to
+and fro between walls has its first images as a measure.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ _EXPONENT: Final = 1.1  # of the distance: reflected impulses fall by it
 _SLANT: Final = 0.35  # side-on over reflected impulse, about
 _LEAST: Final = 0.02
 _CLEAR: Final = 1e-6
+_RIGHT: Final = 0.5 * np.pi
+_DIGITS: Final = 9  # of an angle, rad
 
 NUMBERS: Final[Sequence[str]] = (
     "opposite",
@@ -65,6 +68,23 @@ class _Faces:
             high=np.concatenate([boxes[:, 3 - axis] for axis, *_ in parts]),
             base=np.tile(boxes[:, 4], 4),
             top=np.tile(boxes[:, 5], 4),
+        )
+
+    @classmethod
+    def of_walls(cls, walls: FloatArray, turn: float) -> "_Faces":
+        """Return upright walls that lie along an axis of a turned frame; see `in_frame`."""
+        start, end = in_frame(walls[:, :2], turn), in_frame(walls[:, 2:4], turn)
+        normal = in_frame(walls[:, 4:6], turn)
+        axis, every = np.abs(normal).argmax(axis=1), np.arange(len(walls))
+        ends = np.stack([start[every, 1 - axis], end[every, 1 - axis]])
+        return cls(
+            at=0.5 * (start + end)[every, axis],
+            axis=axis,
+            outward=np.sign(normal[every, axis]),
+            low=ends.min(axis=0),
+            high=ends.max(axis=0),
+            base=walls[:, 6],
+            top=walls[:, 7],
         )
 
     def towards(self, charge: FloatArray, bays: FloatArray, normal: FloatArray) -> "_Faces":
@@ -134,12 +154,22 @@ def fronts_among(everything: FloatArray, buildings: FloatArray) -> FloatArray:
     return found
 
 
+def in_frame(places: FloatArray, turn: float) -> FloatArray:
+    """Return places (n, 2) or (n, 3) in a frame turned counterclockwise by an angle, rad."""
+    found = places.copy()
+    sine, cosine = np.sin(turn), np.cos(turn)
+    found[..., 0] = cosine * places[..., 0] + sine * places[..., 1]
+    found[..., 1] = cosine * places[..., 1] - sine * places[..., 0]
+    return found
+
+
 def numbers_of_echoes(
     charge: FloatArray,
     bays: FloatArray,
     normal: FloatArray,
     boxes: FloatArray,
     high: FloatArray,
+    walls: FloatArray | None = None,
 ) -> FloatArray:
     """Return the numbers of the law of echoes (bays, numbers), see `NUMBERS`.
 
@@ -149,6 +179,8 @@ def numbers_of_echoes(
         normal: Outward normal of their wall (3,).
         boxes: Low x, y, high x, y, base and top of each box (boxes, 6).
         high: Height of the building of each bay (bays,).
+        walls: Start x, y, end x, y, outward normal x, y, base and top of walls at any angle
+            (walls, 8).
     """
     charge = np.broadcast_to(charge, bays.shape)
     way = charge - bays
@@ -156,11 +188,23 @@ def numbers_of_echoes(
     cosine = way @ normal / distance
     sums = np.zeros((len(bays), 3))
     near = np.zeros((len(bays), 3))
-    if len(boxes):
-        faces = _Faces.of(boxes).towards(charge, bays, normal)
-        (bay, wall), ways, longer, met = _reflected(faces, charge, bays)
+    # Walls at an angle are along the axes of a frame of their own.
+    frames = [(0.0, _Faces.of(boxes))] if len(boxes) else []
+    if walls is not None and len(walls):
+        turns = (np.arctan2(walls[:, 5], walls[:, 4]) % _RIGHT).round(_DIGITS) % _RIGHT
+        frames += [
+            (turn, _Faces.of_walls(walls[turns == turn], turn))
+            for turn in np.unique(turns).tolist()
+        ]
+    for turn, every in frames:
+        own_charge, own_bays, own_normal = charge, bays, normal
+        if turn:
+            own_charge, own_bays = in_frame(charge, turn), in_frame(bays, turn)
+            own_normal = in_frame(normal, turn)
+        faces = every.towards(own_charge, own_bays, own_normal)
+        (bay, wall), ways, longer, met = _reflected(faces, own_charge, own_bays)
         # (3) The weight of an echo by distance and incidence, relative to the charge itself.
-        own = np.maximum(ways @ normal / np.maximum(longer, _LEAST), 0.0)
+        own = np.maximum(ways @ own_normal / np.maximum(longer, _LEAST), 0.0)
         incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
             _SLANT + (1.0 - _SLANT) * np.maximum(cosine[bay], 0.0) ** 2
         )
@@ -171,11 +215,12 @@ def numbers_of_echoes(
         # (4) Opposite, left and right of the bay's wall.
         outward = np.zeros((len(faces.at), 2))
         outward[np.arange(len(faces.at)), faces.axis] = faces.outward
-        facing = outward @ normal[:2]
-        turned = outward @ np.array([-normal[1], normal[0]])
-        for k, chosen in enumerate((facing < -0.5, turned > 0.5, turned < -0.5)):
-            sums[:, k] = weight[:, chosen].sum(axis=1)
-            near[:, k] = closeness[:, chosen].sum(axis=1)
+        facing = outward @ own_normal[:2]
+        turned = outward @ np.array([-own_normal[1], own_normal[0]])
+        for k, part in enumerate((-facing, turned, -turned)):
+            share = np.maximum(part, 0.0) ** 2
+            sums[:, k] += (weight * share).sum(axis=1)
+            near[:, k] += (closeness * share).sum(axis=1)
     return np.column_stack(
         [
             sums[:, 0],

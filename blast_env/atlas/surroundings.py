@@ -29,6 +29,9 @@ _AT_ONCE: Final = 1_000_000
 BARRIER: Final = "barrier"
 """In the place of the structure's name, for pieces of a layout."""
 
+_ALONG: Final = 1.0 - 1e-9
+"""Least part of a normal along an axis of a wall that is parallel to the sides of the site."""
+
 _PLACE: Final = re.compile(r"_x[-\d.]+_y[-\d.]+$")  # in the names of pieces
 
 
@@ -40,17 +43,34 @@ class Solid:
         boxes: Low x, y, high x, y, base and top (boxes, 6).
         names: Names of the boxes, with the height in m.
         structures: Name of the structure of each; "barrier" for its pieces.
+        walls: Start x, y, end x, y, outward normal x, y, base and top of the walls of structures
+            that stand at an angle, whose boxes are stairs (walls, 8).
+        owners: Name of the structure of each of these walls.
     """
 
     boxes: FloatArray
     names: tuple[str, ...]
     structures: tuple[str, ...]
+    walls: FloatArray
+    owners: tuple[str, ...]
 
     def only(self, chosen: BoolArray) -> "Solid":
-        """Return some of the boxes."""
+        """Return some of the boxes, and the walls of structures that have any of them."""
         which = np.flatnonzero(chosen).tolist()
         names, structures = (tuple(own[k] for k in which) for own in (self.names, self.structures))
-        return Solid(self.boxes[chosen], names, structures)
+        own = [name in structures for name in self.owners]
+        owners = tuple(name for name in self.owners if name in structures)
+        return Solid(self.boxes[chosen], names, structures, self.walls[own], owners)
+
+    def over(self, scale: float) -> "Solid":
+        """Return it with all lengths over the cube root of a mass."""
+        lengths = np.array([scale] * 4 + [1.0] * 2 + [scale] * 2)
+        return replace(self, boxes=self.boxes / scale, walls=self.walls / lengths)
+
+    @cached_property
+    def is_upright(self) -> BoolArray:
+        """Whether the sides of each box are those of its structure, no stairs (boxes,)."""
+        return np.array([name not in self.owners for name in self.structures], dtype=bool)
 
     @cached_property
     def is_building(self) -> BoolArray:
@@ -61,14 +81,25 @@ class Solid:
     def of(cls, site: BlastSite) -> "Solid":
         """Return the boxes of a site in m."""
         rows, names, structures = [], [], []
+        walls: list[tuple[float, ...]] = []
+        owners: list[str] = []
         for outline in site.structures:
+            if any(max(map(abs, wall.normal)) < _ALONG for wall in outline.walls):
+                top_m = site.air_height_m if outline.height_m is None else outline.height_m
+                owners += [outline.name] * len(outline.walls)
+                walls += [
+                    (*wall.start_m, *wall.end_m, *wall.normal, outline.base_m, top_m)
+                    for wall in outline.walls
+                ]
             for block in outline.blocks:
                 left, bottom, right, top = block.rectangle_m
                 high_m = site.air_height_m if block.height_m is None else block.height_m
                 rows.append((left, bottom, right, top, block.base_m or 0.0, high_m))
                 names.append(f"{_PLACE.sub('', block.name) or outline.name} {high_m:g} m")
                 structures.append(BARRIER if outline.is_barrier else outline.name)
-        return cls(np.array(rows, dtype=float).reshape(-1, 6), tuple(names), tuple(structures))
+        boxes = np.array(rows, dtype=float).reshape(-1, 6)
+        own = np.array(walls, dtype=float).reshape(-1, 8)
+        return cls(boxes, tuple(names), tuple(structures), own, tuple(owners))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +232,7 @@ class SiteAtlas:
         """Return the factors for places of a charge, and what they come from, by their rows."""
         walls, count = self._walls, len(self._walls.middles_m)
         names = np.array(walls.structures)
-        solid = replace(self._solid, boxes=self._solid.boxes / scale)
+        solid = self._solid.over(scale)
         own_edges, factors = _ones(len(charges) * count), _ones(len(charges) * count)
         faces, notes = np.zeros(len(charges) * count, dtype=bool), []
         for bays in self._groups:
@@ -246,11 +277,11 @@ class SiteAtlas:
         adjoins = attached.is_attached(wall.middles, wall.normal, solid.boxes)
         before = between.lies_before(wall.middles, wall.normal, solid.boxes)
         before &= ~adjoins | (solid.boxes[:, 4] == 0.0)  # what hangs on the wall is no front
-        everything = wall.echoes_of(solid.boxes[before])
+        everything = wall.echoes_of(solid.only(before))
         has_pieces = bool((before & ~solid.is_building).any())
         buildings = everything
         if has_pieces:
-            buildings = wall.echoes_of(solid.boxes[before & solid.is_building])
+            buildings = wall.echoes_of(solid.only(before & solid.is_building))
         fronts = echoes.fronts_among(everything, buildings)
         factors, notes = Factors.none(count), [near]
         free = solid.only(~adjoins)
@@ -340,9 +371,11 @@ class _Wall:
     high: FloatArray
     ends: FloatArray
 
-    def echoes_of(self, boxes: FloatArray) -> FloatArray:
-        """Return the numbers of the echoes of some boxes (bays, numbers)."""
-        return echoes.numbers_of_echoes(self.charge, self.middles, self.normal, boxes, self.high)
+    def echoes_of(self, solid: Solid) -> FloatArray:
+        """Return the numbers of the echoes of some boxes and walls (bays, numbers)."""
+        boxes = solid.boxes[solid.is_upright]
+        own = self.charge, self.middles, self.normal
+        return echoes.numbers_of_echoes(*own, boxes, self.high, solid.walls)
 
 
 def _ones(bays: int) -> Factors:

@@ -387,6 +387,58 @@ def test_a_front_on_the_other_side_of_a_street_raises_loads() -> None:
     assert west.factor[0] > 1.03
 
 
+@pytest.mark.parametrize(
+    "other_m",
+    [((30.0, 28.0), (70.0, 38.0)), ((62.0, 54.0), (70.0, 60.0))],
+    ids=["front", "wing"],
+)
+def test_a_site_that_is_turned_has_the_loads_of_the_one_along_the_grid(
+    other_m: tuple[tuple[float, float], tuple[float, float]],
+) -> None:
+    """Modules make stairs of walls at an angle, whose sides had thrown waves elsewhere."""
+
+    def at(x_m: float, y_m: float, angle_deg: float) -> tuple[float, float]:
+        sine, cosine = np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg))
+        x, y = x_m - 50.0, y_m - 50.0
+        return float(50.0 + cosine * x - sine * y), float(50.0 + sine * x + cosine * y)
+
+    def impulses(angle_deg: float) -> dict[tuple[float, float, float], float]:
+        office, other = (
+            {
+                "kind": "polygon",
+                "name": name,
+                "height_m": height_m,
+                "outline_m": [
+                    at(x, y, angle_deg)
+                    for x, y in ((left, low), (right, low), (right, top), (left, top))
+                ],
+            }
+            for name, height_m, ((left, low), (right, top)) in (
+                ("office", 7.0, ((40.0, 60.0), (62.0, 72.0))),
+                ("other", 8.0, other_m),
+            )
+        )
+        office |= {"protected": True, "facade": {"glazing": "window_annealed_6", "bay_m": 3.0}}
+        charge = builders.point(*at(47.0, 44.0, angle_deg), 50.0)
+        site = builders.site("s", (100.0, 100.0), charge, office, other)
+        (threat,) = screen(site, atlas=packaged_laws()).threats
+        found = {}
+        for bay in threat.bays:
+            line = bay.filled.bay.line
+            assert line is not None
+            middle_m = line.point_at(0.5 * (bay.filled.bay.left_m + bay.filled.bay.right_m))
+            x, y = at(*middle_m, -angle_deg)
+            found[round(x, 2), round(y, 2), bay.filled.bay.floor_m] = bay.impulse_pa_s
+        return found
+
+    straight = impulses(0.0)
+    for angle_deg in (20.0, 45.0):
+        turned = impulses(angle_deg)
+        assert turned.keys() == straight.keys()
+        for place, impulse_pa_s in straight.items():
+            assert turned[place] == pytest.approx(impulse_pa_s, rel=0.08), place
+
+
 def test_a_charge_against_a_wall_counts_up_to_twice_its_mass_and_says_so() -> None:
     """Half a metre before the wall; gas has up to 1.36 times the curves along such a wall."""
     site = yard(tnt_kg=100.0, position_m=[29.5, 14.5])
