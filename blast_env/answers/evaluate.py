@@ -19,10 +19,10 @@ from blast_env.answers.document import (
     validation_lines,
 )
 from blast_env.evaluation import BlastCounts
-from blast_env.evaluation.cases import are_all, fixed_charges
+from blast_env.evaluation.cases import are_all, fixed_charges, has_few_places
 from blast_env.evaluation.questions.reduction import Evaluation
 from blast_env.geometry import layout_counts
-from blast_env.site import ObjectiveSection
+from blast_env.site import ObjectiveSection, VehicleSource
 from blast_env.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -61,17 +61,29 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
     is_scaled = found.engine.needs_calibration
     law = f"calibration {found.calibration}, " if is_scaled else ""
     yield Line.of(f"{law}scenario hash {scenario.content_hash[:12]}", kind="quiet")
-    charges = [threat.charge for threat in found.threats]
-    yield from lines(f"note: {words}" for words in left_out_words(scenario, charges))
-    fixed = len(fixed_charges(scenario))
+    yield from lines(f"note: {words}" for words in sampling_notes(found))
+    yield from lines((f"note: {note}" for note in found.notes), "flag")
+
+
+def sampling_notes(found: Evaluation) -> Iterator[str]:
+    """Yield which charges of the site count in the means, and how."""
+    scenario, charges = found.scenario, [threat.charge for threat in found.threats]
+    yield from left_out_words(scenario, charges)
+    sources, fixed = scenario.charge, len(fixed_charges(scenario))
     if fixed > 1 and are_all(scenario, charges):
-        weighted = len({source.weight for source in scenario.charge}) > 1
+        weighted = len({source.weight for source in sources}) > 1
         alike = " alike, whatever their weights" if weighted else ""
-        yield Line.of(
-            f"note: the site has {fixed} fixed charges, which all count here{alike}; the interval "
+        yield (
+            f"the site has {fixed} fixed charges, which all count here{alike}; the interval "
             "is their spread, not an uncertainty about others"
         )
-    yield from lines((f"note: {note}" for note in found.notes), "flag")
+    elif not fixed and has_few_places(scenario) and not found.engine.has_noise:
+        shares = {
+            source.weight / (source.places if isinstance(source, VehicleSource) else 1)
+            for source in sources
+        }
+        if len(shares) > 1:
+            yield "all places of charges count here alike, whatever the weights of their sources"
 
 
 def cache_line(counts: BlastCounts) -> Line:

@@ -8,7 +8,12 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from blast_env.answers.evaluate import cache_line, evaluation_answer, evaluation_picture
+from blast_env.answers.evaluate import (
+    cache_line,
+    evaluation_answer,
+    evaluation_picture,
+    sampling_notes,
+)
 from blast_env.answers.terminal import print_parts
 from blast_env.cli.command import Target, note_target, writes
 from blast_env.cli.options import (
@@ -131,7 +136,8 @@ def evaluate(
                 progress=progress,
             )
     preset = site.simulation.preset if used.needs_calibration else None
-    record = {**found.to_dict(), "preset": preset, "provenance": provenance}
+    notes = [*sampling_notes(found), *found.notes]
+    record = {**found.to_dict(), "notes": notes, "preset": preset, "provenance": provenance}
     written = [] if out is None else _write(found, record, out)
     if export is not None:
         written += export_to(LayoutPlan(site, found.layout, provenance=provenance), export)

@@ -15,7 +15,13 @@ from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_per_charge
+from blast_env.evaluation.cases import (
+    LoadCase,
+    draw_threats,
+    in_turn,
+    judged_threats,
+    one_per_charge,
+)
 from blast_env.evaluation.engines.contract import (
     CALIBRATED_ENGINES,
     ENGINE_NAMES,
@@ -247,9 +253,10 @@ class ChargeInput:
     ) -> tuple[LoadCase, ...]:
         """Return the threats drawn by seeds, with the given place and mass.
 
-        Fixed charges come in turn, each once before any repeats. Without noise a charge has one
-        realisation: repeated ones are dropped.
+        Fixed charges come in turn, each once before any repeats; see `judged_threats` for those
+        that are dropped. At a given place a charge of one mass is dropped, too.
         """
-        drawn = in_turn(scenario, draw_threats(scenario, seeds))
+        drawn = judged_threats(scenario, seeds, has_noise=engine.has_noise)
         threats = tuple(LoadCase(self.fixed(scenario, draw.charge), draw.seed) for draw in drawn)
-        return threats if engine.has_noise else one_per_charge(threats)
+        is_free = self.place_m is None or engine.has_noise
+        return threats if is_free else one_per_charge(threats)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from blast_env.evaluation.blasts import Blasts
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct, one_per_charge
 from blast_env.evaluation.engines.contract import BlastDrawing, Engine
 from blast_env.evaluation.evaluator import BlastEvaluator, BlastStore
 from blast_env.evaluation.record import BlastRecord
@@ -68,7 +68,9 @@ class Campaign:
 
     def cost(self) -> tuple[CostGuess, ...]:
         """Return the estimated cost of each blast, of engines that can tell; nothing is run."""
-        asked = [(self.evaluator.engine, threat.charge) for threat in self.case.threats]
+        engine, threats = self.evaluator.engine, self.case.threats
+        charges = [own.charge for own in (threats if engine.has_noise else one_per_charge(threats))]
+        asked = [(engine, charge) for charge in charges]
         if self.coarser is not None:
             asked.append((self.coarser.engine, self.case.threats[0].charge))
         known = {pair: pair[0].cost(self.scenario, pair[1]) for pair in dict.fromkeys(asked)}

@@ -21,6 +21,7 @@ from blast_env.site import (
     PointSource,
     Scenario,
     VehicleCharge,
+    VehicleSource,
     find_scenario,
 )
 from blast_env.site.blast_site import Charge
@@ -114,6 +115,28 @@ def in_turn(scenario: AnyScenario, threats: Sequence[LoadCase]) -> tuple[LoadCas
         replace(threat, charge=charges[order[index % len(order)]])
         for index, threat in enumerate(threats)
     )
+
+
+def judged_threats(
+    scenario: AnyScenario, seeds: Iterable[int], *, has_noise: bool
+) -> tuple[LoadCase, ...]:
+    """Return one threat per seed, for means over them; fixed charges come in turn.
+
+    Without noise a charge has one realisation. Where all charges are at a few places, repeated ones
+    are dropped, since they are no further evidence. Where a charge may be anywhere on a segment or
+    an area, all draws count, and so do the weights of the sources.
+
+    Raises:
+        BlastEnvError: As for `draw_threats`.
+    """
+    drawn = in_turn(scenario, draw_threats(scenario, seeds))
+    return drawn if has_noise or not has_few_places(scenario) else one_per_charge(drawn)
+
+
+def has_few_places(scenario: AnyScenario) -> bool:
+    """Return whether all charges are at points, or at the worst places of vehicles."""
+    sources = find_scenario(scenario).charge
+    return all(isinstance(source, PointSource | VehicleSource) for source in sources)
 
 
 def are_all(scenario: AnyScenario, charges: Iterable[AnyCharge | None]) -> bool:

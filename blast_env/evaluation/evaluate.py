@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.blasts import NO_BARRIER
 from blast_env.evaluation.campaign import Campaign, blasts_of
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet, draw_threats, in_turn
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, judged_threats
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.engines.contract import final_engine
 from blast_env.evaluation.evaluator import BlastEvaluator, BlastStore, Evaluators
@@ -40,8 +40,9 @@ def evaluate_layout(
     """Estimate the load reduction of a layout on the protected structures, with its uncertainty.
 
     Every seed draws a threat from the scenario; fixed charges come in turn, each once before any
-    repeats. The layout and the empty site are under the same threats. Use seeds other than those of
-    the layout's search, on which it is overrated.
+    repeats, which are dropped by gas dynamics (`judged_threats`). The layout and the empty site are
+    under the same threats. Use seeds other than those of the layout's search, on which it is
+    overrated.
 
     Args:
         scenario: The scenario, or its bundled name or path; for the particle engines it must name
@@ -73,7 +74,11 @@ def evaluate_layout(
     found = find_scenario(scenario)
     judge = final_engine(engine, [found], cell_m, cells=cells)
     evaluator = BlastEvaluator(found, judge, cache=cache)
-    drawn = in_turn(found, draw_threats(found, seeds)) if threats is None else tuple(threats)
+    drawn = (
+        judged_threats(found, seeds, has_noise=judge.has_noise)
+        if threats is None
+        else tuple(threats)
+    )
     return compare(
         evaluator,
         [LoadCaseSet(found, drawn)],

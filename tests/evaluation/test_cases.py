@@ -1,6 +1,8 @@
 """Threats are the charges that `simulate` would draw; every purpose has seeds of its own."""
 
+import json
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -9,10 +11,14 @@ import pytest
 
 from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
+from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats, evaluate_layout
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, search_set
-from blast_env.site import ConditionalValueAtRisk, PointSource, Scenario
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.layout import write_layout
+from blast_env.site import ConditionalValueAtRisk, PointSource, Scenario, save_scenario
+from tests.cli.running import run
 from tests.evaluation.cases import COURTYARD, SEEDS
+from tests.gas_sites import WALL, hut
 
 
 def test_a_seed_draws_the_charge_of_its_blast() -> None:
@@ -181,3 +187,33 @@ def test_charges_along_a_line_are_as_drawn() -> None:
     assert in_turn(COURTYARD, threats) == threats
     assert fixed_charges(COURTYARD) == ()
     assert not are_all(COURTYARD, [threat.charge for threat in threats])
+
+
+def test_a_blast_that_draws_repeat_is_no_further_evidence() -> None:
+    """Python and the command say the same of fixed charges: an interval had counted copies."""
+    first = {"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0}
+    fixed = hut(charge=[first | {"position_m": [2.0, y_m]} for y_m in (3.0, 4.0, 5.0)])
+    engine = GasEngine(border_m=0.0, until=0.02)
+    few, many = (evaluate_layout(fixed, WALL, range(n), engine=engine) for n in (3, 16))
+    assert len(many.threats) == 3
+    assert sorted(few.loads[0]) == sorted(many.loads[0])
+    assert np.ptp(many.ci95) == pytest.approx(np.ptp(few.ci95))
+
+
+def test_draws_keep_the_weights_of_sources_where_places_are_without_number(tmp_path: Path) -> None:
+    """Nine of ten draws are the point: it had counted once, as each of the others."""
+    often = {"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0, "weight": 9.0}
+    along = {"kind": "segment", "start_m": [2.0, 1.0], "end_m": [2.0, 7.0], "tnt_kg": 1.0}
+    site = hut(charge=[often, along])
+    found = evaluate_layout(site, WALL, range(32), engine=GasEngine(border_m=0.0, until=0.02))
+    assert len(found.threats) == 32
+    masses = [threat.charge.tnt_kg for threat in found.threats]
+    assert 24 < masses.count(5.0) < 32
+    save_scenario(site, tmp_path / "site.toml")
+    write_layout(tmp_path / "layout.json", site, WALL, {})
+    files = ("--scenario", tmp_path / "site.toml", "--layout", tmp_path / "layout.json")
+    done = run("evaluate", *files, "--cell", 0.5, "--seeds", 32, "--first-seed", 0, "--json")
+    record = json.loads(done.stdout)
+    assert record["cache"]["blasts"] == 2 * (33 - masses.count(5.0))
+    again = evaluate_layout(site, WALL, range(32), cell_m=0.5)
+    assert record["result"]["load"]["value"] == again.mean.value
