@@ -37,9 +37,7 @@ from blast_env.sites import ITEM_SITES
 from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate.fitting import (
     Errors,
-    LoadErrors,
     Predictions,
-    errors,
     errors_of,
     fit,
     folds,
@@ -55,6 +53,7 @@ from blast_env.surrogate.intervals import (
     widened,
 )
 from blast_env.surrogate.network import Check, Fit, Networks, Surrogate, load_surrogate
+from blast_env.surrogate.points import CLOSE, WIDE, Spacing
 from blast_env.surrogate.samples import Loads, Samples
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
@@ -234,14 +233,17 @@ def fit_it(
         began_s = perf_counter()
         fitted = fit(samples, ~held_out, epochs, seed, about, device=device)
         seconds = round(perf_counter() - began_s, 1)
+        # As guesses are made: those of impulses at points that are farther apart.
+        guessed = samples_of(named[named["scenario"].isin(samples.scenario[held_out])], WIDE)
+        every_one = np.ones(len(guessed), dtype=bool)
         impulse, peak = (
-            Holdout.of(fitted, networks, samples, loads, held_out, least, seed)
-            for networks, loads, least in (
-                (fitted.impulse, samples.impulse, IMPULSE_LEAST_SPREAD),
-                (fitted.peak, samples.peak, PEAK_LEAST_SPREAD),
+            Holdout.of(fitted, networks, asked, loads, chosen, least, seed)
+            for networks, asked, loads, chosen, least in (
+                (fitted.impulse, guessed, guessed.impulse, every_one, IMPULSE_LEAST_SPREAD),
+                (fitted.peak, samples, samples.peak, held_out, PEAK_LEAST_SPREAD),
             )
         )
-        off = LoadErrors(impulse.errors, peak.errors)
+        off = impulse.errors, peak.errors
         print_line(_errors_table({f"{sites} held-out sites": off}))
         print_line(
             "\n" + _coverage_table(samples, held_out, (impulse.covered, peak.covered), _kind)
@@ -269,10 +271,10 @@ def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFra
     return table[~table["scenario"].isin(["", *without])]
 
 
-def samples_of(rows: pd.DataFrame) -> Samples:
-    """Return the training samples of the rows of a blast table."""
+def samples_of(rows: pd.DataFrame, spacing: Spacing = CLOSE) -> Samples:
+    """Return the samples of the rows of a blast table, by default those of a fit."""
     scenarios = [scenario_of(name) for name in rows["scenario"].unique()]
-    return Samples.of(rows, {scenario.content_hash: scenario for scenario in scenarios})
+    return Samples.of(rows, {scenario.content_hash: scenario for scenario in scenarios}, spacing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,19 +377,24 @@ def check(
     with user_errors():
         loaded, found, coverage = load_surrogate(surrogate), {}, []
         for path in data:
-            samples = samples_of(named_rows([path]))
-            sites = f"{len(np.unique(samples.site))} sites of {path.stem}"
-            every = np.ones(len(samples), dtype=bool)
-            found[sites] = errors(loaded, samples, every)
+            rows = named_rows([path])
+            wide, close = samples_of(rows, WIDE), samples_of(rows)
+            sites = f"{len(np.unique(wide.site))} sites of {path.stem}"
+            every = np.ones(len(wide), dtype=bool)
+            told = (
+                predictions(loaded, loaded.impulse, wide, wide.impulse, every),
+                predictions(loaded, loaded.peak, close, close.peak, every),
+            )
+            of_both = wide.impulse, close.peak
+            off = [
+                errors_of(own, loads.target, wide.case)
+                for own, loads in zip(told, of_both, strict=True)
+            ]
+            found[sites] = off[0], off[1]
             if loaded.fit.impulse is not None and loaded.fit.peak is not None:
-                impulse, peak = (
-                    _covered(predictions(loaded, networks, samples, loads, every), loads, record)
-                    for networks, loads, record in (
-                        (loaded.impulse, samples.impulse, loaded.fit.impulse),
-                        (loaded.peak, samples.peak, loaded.fit.peak),
-                    )
-                )
-                coverage.append(_coverage_table(samples, every, (impulse, peak), str))
+                records = loaded.fit.impulse, loaded.fit.peak
+                impulse, peak = map(_covered, told, of_both, records)
+                coverage.append(_coverage_table(wide, every, (impulse, peak), str))
         print_line("\n\n".join((_errors_table(found), *coverage)))
 
 
@@ -398,7 +405,7 @@ def _covered(found: Predictions, loads: Loads, record: Check) -> Covered:
     return Covered(spreads <= record.spreads, spreads)
 
 
-def _errors_table(found: Mapping[str, LoadErrors]) -> str:
+def _errors_table(found: Mapping[str, tuple[Errors, Errors]]) -> str:
     rows = [
         (
             f"{load} on {sites}",
@@ -409,7 +416,7 @@ def _errors_table(found: Mapping[str, LoadErrors]) -> str:
             f"{100.0 * quantity.lost:.1f} points",
         )
         for sites, both in found.items()
-        for load, quantity in (("impulse", both.impulse), ("peak", both.peak))
+        for load, quantity in zip(("impulse", "peak"), both, strict=True)
     ]
     headers = (
         "",

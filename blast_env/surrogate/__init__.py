@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from blast_env.surrogate.fitting import (
         MEMBERS,
         Predictions,
-        errors,
         fit,
         folds,
         load_errors,
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
         load_surrogate,
         packaged_surrogate,
     )
-    from blast_env.surrogate.points import WallPoints
+    from blast_env.surrogate.points import CLOSE, WIDE, Spacing, WallPoints
     from blast_env.surrogate.relations import RELATIONS, solid_relations
     from blast_env.surrogate.samples import Samples
     from blast_env.surrogate.walls import SurrogateSite, site_of
@@ -40,6 +39,7 @@ else:
 
 __all__ = [
     "ABOVE_M",
+    "CLOSE",
     "COVERAGE",
     "FALLS_M",
     "FEATURES",
@@ -50,6 +50,7 @@ __all__ = [
     "SHARES",
     "STATIONS",
     "TRAITS",
+    "WIDE",
     "Check",
     "Correction",
     "Fit",
@@ -58,6 +59,7 @@ __all__ = [
     "Networks",
     "Predictions",
     "Samples",
+    "Spacing",
     "Surrogate",
     "SurrogateEngine",
     "SurrogateSite",
@@ -65,7 +67,6 @@ __all__ = [
     "Ways",
     "apart_m3",
     "covered",
-    "errors",
     "fit",
     "folds",
     "interval_factor",

@@ -163,21 +163,6 @@ class Errors:
     cases: int
 
 
-class LoadErrors(NamedTuple):
-    """Errors of the predictions of impulses and of peaks."""
-
-    impulse: Errors
-    peak: Errors
-
-
-def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> LoadErrors:
-    """Compare predictions with gas dynamics on some samples."""
-    return LoadErrors(
-        load_errors(surrogate, surrogate.impulse, samples, samples.impulse, chosen),
-        load_errors(surrogate, surrogate.peak, samples, samples.peak, chosen),
-    )
-
-
 def load_errors(
     surrogate: Surrogate,
     networks: Networks,

@@ -10,15 +10,27 @@ from blast_env.geometry import OUTWARDS, WallLine
 from blast_env.site import AnyStructure
 from blast_env.units import MODULE_SIDE_M
 
-_ALONG_M: Final = 1.0
-_UP_M: Final = 1.5
-"""Spacing of points along and up a wall; larger where there would be too many points."""
 
-MOST_POINTS: Final = 250
-"""Approximate largest number of points on all walls of a site.
+class Spacing(NamedTuple):
+    """How far apart points are; farther where there would be too many.
 
-More points cost time and do not change the loads, since large walls are far away.
-"""
+    Attributes:
+        along_m: Spacing along a wall.
+        up_m: Spacing up a wall.
+        most_points: Approximate largest number of points on all walls of a site. More cost time
+            and do not change the loads, since large walls are far away.
+    """
+
+    along_m: float
+    up_m: float
+    most_points: int
+
+
+CLOSE: Final = Spacing(1.0, 1.5, 250)
+"""Spacing for peaks, which are local, and for the data of a fit."""
+
+WIDE: Final = Spacing(1.5, 2.0, 125)
+"""Spacing for the mean impulse alone: half as many points, equal errors (`studies.surrogate`)."""
 
 _BEFORE_M: Final = 0.05
 """Distance of points in front of their wall, so that the wall does not obstruct their paths."""
@@ -44,16 +56,19 @@ class WallPoints(NamedTuple):
     to_roof_m: FloatArray
 
     @classmethod
-    def on(cls, structures: Sequence[AnyStructure], air_m: float) -> "WallPoints":
-        """Place points on structures, about one per metre of length and 1.5 m of height.
+    def on(
+        cls, structures: Sequence[AnyStructure], air_m: float, spacing: Spacing = CLOSE
+    ) -> "WallPoints":
+        """Place points on structures.
 
         Args:
             structures: The structures.
             air_m: Height of structures without a height of their own.
+            spacing: About how far apart the points are.
         """
         heights_m = [structure.height_m or air_m for structure in structures]
-        apart = _apart(structures, heights_m)
-        tables = [_points(*item, apart) for item in zip(structures, heights_m, strict=True)]
+        own = _widened(spacing, structures, heights_m)
+        tables = [_points(*item, own) for item in zip(structures, heights_m, strict=True)]
         starts: IntArray = np.cumsum([0, *(len(table) for table in tables[:-1])])
         table = np.concatenate(tables) if tables else np.empty((0, 8))
         places_m, outward = (np.ascontiguousarray(item) for item in (table[:, :3], table[:, 3:5]))
@@ -61,17 +76,17 @@ class WallPoints(NamedTuple):
         return cls(starts, places_m, outward, *columns)
 
 
-def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArray:
+def _points(structure: AnyStructure, height_m: float, spacing: Spacing) -> FloatArray:
     """Return position, outward normal, area, and distances to edge and roof (points, 8)."""
     # 1. Levels of points over the height; 2. along each wall, points in the middle of equal parts,
     # in the air before it.
     left, bottom, right, top = structure.rectangle_m
     rise_m = height_m - structure.base_m
-    levels = max(1, round(rise_m / (_UP_M * apart)))
+    levels = max(1, round(rise_m / spacing.up_m))
     z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
     rows = []
     for length_m, (x_out, y_out), line in walls_of(structure):
-        number = max(1, round(length_m / (_ALONG_M * apart)))
+        number = max(1, round(length_m / spacing.along_m))
         area_m2 = length_m * rise_m / (number * levels)
         for along_m in (np.arange(number) + 0.5) * length_m / number:
             if line is not None:
@@ -99,10 +114,14 @@ def walls_of(
         yield top - bottom if OUTWARDS[face][0] else right - left, OUTWARDS[face], None
 
 
-def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
-    """Return the factor on the spacing of points that keeps their number near `MOST_POINTS`."""
+def _widened(
+    spacing: Spacing, structures: Sequence[AnyStructure], heights_m: Sequence[float]
+) -> Spacing:
+    """Return the spacing that keeps the number of points near its largest one."""
     # Points are per area: their number falls with the square of their distance.
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
         area_m2 += height_m * sum(length_m for length_m, *_ in walls_of(structure))
-    return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
+    along_m, up_m, most = spacing
+    factor = float(max(1.0, (area_m2 / (along_m * up_m * most)) ** 0.5))
+    return Spacing(along_m * factor, up_m * factor, most)

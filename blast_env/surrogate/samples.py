@@ -17,6 +17,7 @@ from blast_env.site.blast_site import Charge
 from blast_env.surrogate.layers import HalfArray, SingleArray
 from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
+from blast_env.surrogate.points import CLOSE, Spacing
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.walls import site_of
 
@@ -96,12 +97,15 @@ class Samples:
         return found
 
     @classmethod
-    def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
+    def of(
+        cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario], spacing: Spacing = CLOSE
+    ) -> "Samples":
         """Return the loads on protected structures of a table of `studies.blast_table`.
 
         Args:
             blasts: The table.
             scenarios: Scenarios by content hash; rows of others are omitted.
+            spacing: Of the points. Tables have loads at those of `CLOSE`; at others none are known.
 
         Raises:
             BlastEnvError: If no row remains.
@@ -111,7 +115,8 @@ class Samples:
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         # 1. Each site once; each blast once, with the features of all points of its walls.
-        sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
+        hashes = rows["scenario_hash"].unique()
+        sites = {name: site_of(scenarios[name], spacing=spacing) for name in hashes}
         features, area_m2, impulses, peaks = [], [], [], []
         related, solids = _Rows(), []
         traits: list[SingleArray] = []
@@ -142,6 +147,11 @@ class Samples:
         # 3. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         counts = np.array([len(feature) for feature in features])
+        unknown = [_UNKNOWN] * len(rows)
+        impulses_at, peaks_at = (
+            _at_points(rows[name] if spacing == CLOSE else unknown, counts)
+            for name in ("point_impulses_pa_s", "point_peaks_pa")
+        )
         return cls(
             features=np.concatenate(features),
             relations=related.joined(),
@@ -153,13 +163,13 @@ class Samples:
             impulse=Loads(
                 np.concatenate(impulses),
                 np.log(rows["impulse_pa_s"].to_numpy()),
-                _at_points(rows["point_impulses_pa_s"], counts),
+                impulses_at,
                 IMPULSE_POWER,
             ),
             peak=Loads(
                 np.concatenate(peaks),
                 np.log(rows["peak_pa"].to_numpy()),
-                _at_points(rows["point_peaks_pa"], counts),
+                peaks_at,
                 PEAK_POWER,
             ),
             site=rows.groupby("scenario_hash").ngroup().to_numpy(),

@@ -25,7 +25,7 @@ from blast_env.surrogate.hiding import may_be_hidden
 from blast_env.surrogate.loads import SiteArrays
 from blast_env.surrogate.neighbours import piece_traits
 from blast_env.surrogate.pieces import Box, Memory
-from blast_env.surrogate.points import WallPoints
+from blast_env.surrogate.points import CLOSE, WIDE, Spacing, WallPoints
 
 _MOST_APPROACHES: Final = 16
 """Number of charges of a site kept for a fit, each of up to two megabytes."""
@@ -41,6 +41,7 @@ class SurrogateSite:
     Args:
         scenario: The scenario.
         memory: The cache of pieces, which sites may share; by default a separate one.
+        spacing: Of the points on walls; by default what the objective needs.
 
     Attributes:
         scenario: The scenario.
@@ -50,7 +51,9 @@ class SurrogateSite:
         alternatives: The bays of the facades, if the objective counts their response.
     """
 
-    def __init__(self, scenario: Scenario, memory: Memory | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, memory: Memory | None = None, spacing: Spacing | None = None
+    ) -> None:
         self.scenario = scenario
         self.memory = Memory() if memory is None else memory
         self.protected = tuple(
@@ -67,7 +70,8 @@ class SurrogateSite:
                 for box in structure.boxes_m
             ]
         ).reshape(-1, 5)
-        self._points = WallPoints.on(self.protected, air_m)
+        needed = CLOSE if self.counts_peaks else WIDE
+        self._points = WallPoints.on(self.protected, air_m, spacing or needed)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
         self._terraces = list(filter(attrgetter("carries"), scenario.structures))
         self._boxes: dict[Element, Box | None] = {}  # none of a measure
@@ -290,17 +294,20 @@ def _lines(boxes: Sequence[Rectangle], along: int) -> list[Rectangle]:
     return lines
 
 
-def site_of(scenario: Scenario, memory: Memory | None = None) -> SurrogateSite:
+def site_of(
+    scenario: Scenario, memory: Memory | None = None, spacing: Spacing | None = None
+) -> SurrogateSite:
     """Return a scenario as the surrogate represents it.
 
     Args:
         scenario: The scenario.
         memory: As for `SurrogateSite`.
+        spacing: As for `SurrogateSite`.
 
     Raises:
         BlastEnvError: If no structure is protected.
     """
-    site = SurrogateSite(scenario, memory)
+    site = SurrogateSite(scenario, memory, spacing)
     if not site.protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
     return site
