@@ -494,7 +494,7 @@ def judge(
     sites: Annotated[int, typer.Option(min=1, help="How many of each kind.")] = 40,
     surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
     charges: Annotated[int, typer.Option(min=1, help="Held-out charges of a scenario.")] = 6,
-    changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 300,
+    changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 1000,
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
     cluster: ClusterAddress = None,

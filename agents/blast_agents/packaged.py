@@ -8,7 +8,7 @@ does without torch.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -22,7 +22,6 @@ from safetensors.numpy import load, save
 from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, case_for, improved
-from blast_env.design.search.moves import drawn_by_rank
 from blast_env.design.search.package import proposed
 from blast_env.design.search.problem import Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
@@ -45,13 +44,13 @@ WEIGHTS: Final = "packaged_agent.safetensors"
 FEW_DRAWS: Final = 8
 """Layouts that the agent draws for one proposal."""
 
-FEW_CHANGES: Final = 24
+FEW_CHANGES: Final = 144
 """Changes of the best guesses that one proposal looks at after that."""
 
 DRAWS: Final = 32
 """Layouts that the agent draws where guesses choose among them."""
 
-CHANGES: Final = 240
+CHANGES: Final = 2000
 """Changes of the best guesses that are looked at after that."""
 
 SURE_GAIN: Final = 0.01
@@ -62,9 +61,6 @@ MOST_DRAWS: Final = 10_000
 
 _FEW_CANDIDATES: Final = 12_000
 """Candidates in all draws of one proposal: more take it far beyond 50 ms."""
-
-_MOST_REDRAWN: Final = 3
-"""Most pieces that are taken away, and drawn anew, in a change."""
 
 _MOST_BYTES: Final = 5_000_000
 
@@ -309,8 +305,6 @@ class PackagedAgent:
         """Return all layouts of a search by guesses, the best first, each sorted.
 
         It begins with none, the rules' layouts, the policy's and draws, and then changes the best.
-        Half of the changes are moves. For the others it takes up to three pieces away, and the
-        policy draws further ones.
 
         Args:
             guesses: The guesses, which it extends.
@@ -329,31 +323,13 @@ class PackagedAgent:
         layouts = [(), *rules.values(), *self.layouts(candidates, 1, None)]
         if checked:
             layouts += self.layouts(candidates, checked, generator(seed))
-        redrawn = partial(self._redrawn, candidates)
-        return improved(guesses, layouts, most, generator(seed), change=redrawn)
-
-    def _redrawn(
-        self,
-        candidates: Candidates,
-        best: Sequence[Layout],
-        count: int,
-        rng: np.random.Generator,
-    ) -> list[Layout]:
-        """Return changes of layouts: pieces are taken away at random, and drawn by the policy."""
-        parts = []
-        for _ in range(count):
-            pieces = candidates.indices_of(drawn_by_rank(best, rng))
-            gone = min(1 + int(rng.integers(_MOST_REDRAWN)), len(pieces))
-            stay = np.sort(rng.permutation(len(pieces))[gone:])
-            parts.append(tuple(pieces[place] for place in stay.tolist()))
-        return [tuple(sorted(layout)) for layout in self.layouts(candidates, count, rng, parts)]
+        return improved(guesses, layouts, most, generator(seed))
 
     def layouts(
         self,
         candidates: Candidates,
         count: int,
         rng: np.random.Generator | None,
-        begun: Sequence[tuple[int, ...]] = (),
         tell: Callable[[Decision], None] = lambda _: None,
     ) -> tuple[Layout, ...]:
         """Return layouts, drawn or, without a generator, of the highest scores.
@@ -362,18 +338,13 @@ class PackagedAgent:
             candidates: The candidates.
             count: Number of layouts.
             rng: The generator.
-            begun: Candidates that stand at first in each, if any do.
             tell: Called with each decision.
         """
         prepared = _prepared(self.network, candidates)
         batch = LayoutBatch(candidates.empty, candidates.rules, count)
         batch.begin(range(count), candidates.rules, candidates.empty)
-        parts = begun or [()] * count
-        for step in range(max(map(len, parts))):
-            own = [index for index, part in enumerate(parts) if len(part) > step]
-            batch.place(own, [int(candidates.numbers[parts[index][step]]) for index in own])
-        standing = {frozenset(part): Standing.after(candidates, part) for part in parts}
-        placed = [frozenset(part) for part in parts]
+        placed = [frozenset[int]()] * count
+        standing = {placed[0]: Standing(candidates)}
         open_ones = np.flatnonzero(~batch.is_full).tolist()
         while open_ones:
             # Many layouts have the same pieces: the network looks at them once.

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import blast_env
 from blast_env import load_scenario
 from blast_env.design.search import (
+    BatchMoves,
     Layout,
     Moves,
     Plan,
@@ -249,6 +250,54 @@ def test_a_whole_wall_can_move_at_once() -> None:
     shifts = set()
     for _ in range(50):
         moved = sorted(moves.neighbour(wall, rng))
+        steps = {(a[0] - b[0], a[1] - b[1]) for a, b in zip(moved, wall, strict=True)}
+        if len(steps) == 1:
+            shifts |= steps
+    assert len(shifts) > 10
+
+
+MANY = SITES | {name: load_scenario(name) for name in ("school_and_clinic", "hotel_forecourt")}
+
+
+@given(name=st.sampled_from(sorted(MANY)), seed=st.integers(0, 10_000))
+def test_neighbours_of_many_layouts_are_legal_and_close(name: str, seed: int) -> None:
+    """A walk of many layouts at once, on sites with modules and with catalogues, and vehicles."""
+    scenario, rng = MANY[name], np.random.default_rng(seed)
+    moves = BatchMoves(scenario)
+    best: list[Layout] = [random_layout(scenario, rng) for _ in range(3)]
+    for _ in range(4):
+        found = moves.near_best(best, 8, rng)
+        most = max(map(len, best))
+        for neighbour in found:
+            assert LayoutState.of(scenario, neighbour).layout == neighbour
+            assert neighbour == tuple(sorted(neighbour))
+            assert len(neighbour) <= most + 2  # one for three, as budget and stock allow
+        best = found
+
+
+@pytest.mark.parametrize("name", ["courtyard", "school_and_clinic"])
+def test_neighbours_of_many_layouts_are_many(name: str) -> None:
+    """From the best one in most cases, and from none by an element; the same for the same seed."""
+    scenario, moves = MANY[name], BatchMoves(MANY[name])
+    alone = {*moves.near_best([()], 20, np.random.default_rng(0))}
+    assert {len(layout) for layout in alone} == {1}
+    assert len(alone) > 15
+    first, second = (random_layout(scenario, np.random.default_rng(seed)) for seed in (0, 1))
+    drawn, again = (
+        moves.near_best([first, second], 60, np.random.default_rng(2)) for _ in range(2)
+    )
+    assert drawn == again
+    assert len({*drawn}) > 40
+    apart = [[len({*own} ^ {*layout}) for layout in (first, second)] for own in drawn]
+    assert sum(to_first < to_second for to_first, to_second in apart) > 0.5 * len(apart)
+
+
+def test_whole_walls_of_many_layouts_move_at_once() -> None:
+    scenario = site(stock=4)
+    moves = BatchMoves(scenario, count_share=0.0, wall_share=1.0)
+    wall = ((8, 5), (9, 5), (10, 5), (11, 5))
+    shifts = set()
+    for moved in moves.near_best([wall], 50, np.random.default_rng(0)):
         steps = {(a[0] - b[0], a[1] - b[1]) for a, b in zip(moved, wall, strict=True)}
         if len(steps) == 1:
             shifts |= steps

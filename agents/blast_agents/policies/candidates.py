@@ -6,7 +6,7 @@ stand, in the frame of the line from the charge to the walls. So a turned or mir
 same features, and their number does not depend on the site.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -247,16 +247,6 @@ class Candidates:
         """The rules of placing on the site."""
         return PlacementRules.of(self.empty)
 
-    @cached_property
-    def _index(self) -> dict[int, int]:
-        return {number: index for index, number in enumerate(self.numbers.tolist())}
-
-    def indices_of(self, layout: Layout) -> list[int]:
-        """Return the candidates of a layout, posts of the line first; others are left out."""
-        numbers = map(self.empty.catalogue.action, layout)
-        found = [self._index[number] for number in numbers if number in self._index]
-        return sorted(found, key=lambda index: not self.is_post[index])
-
 
 _HIDDEN_CUT: Final = STATIC.index("hidden_cut")
 
@@ -488,14 +478,6 @@ class Standing:
         self.placed = 0
         self.posts = 0
         self.spent = 0.0
-
-    @classmethod
-    def after(cls, candidates: Candidates, pieces: Iterable[int]) -> "Standing":
-        """Return the state after some candidates."""
-        state = cls(candidates)
-        for index in pieces:
-            state.add(index)
-        return state
 
     def grown(self, index: int) -> "Standing":
         """Return the state with one more piece, by its candidate."""

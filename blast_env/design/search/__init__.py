@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         kinds_for,
         only,
     )
+    from blast_env.design.search.batch_moves import BatchMoves
     from blast_env.design.search.by_rule import (
         ProposerKind,
         ProposerRow,
@@ -45,6 +46,7 @@ else:
     __getattr__, __dir__ = on_first_use(__name__)
 
 __all__ = [
+    "BatchMoves",
     "BestRuleSearch",
     "Candidate",
     "DesignProblem",

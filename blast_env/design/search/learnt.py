@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import cycle
 from math import ceil, inf, isnan
 from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.design.search.batch_moves import BatchMoves
 from blast_env.design.search.moves import Moves
 from blast_env.design.search.problem import Progress, Report, SamplingAgent, SearchResult
 from blast_env.design.search.session import Plan, Search, SearchSession
@@ -32,9 +32,12 @@ The latter are the central one and those farthest apart.
 """
 
 _KEPT: Final = 4
-"""Number of best layouts that the search changes."""
+"""Number of best layouts by blasts that the search changes."""
 
-_BATCH: Final = 8
+_GUESSED: Final = 8
+"""The same by guesses alone."""
+
+_BATCH: Final = 24
 """Number of changed layouts per call of the surrogate."""
 
 _SITE_SHARE: Final = 0.3
@@ -94,21 +97,16 @@ class Guesses:
         return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
 
 
-Changer = Callable[[Sequence[Layout], int, np.random.Generator], Sequence[Layout]]
-"""Returns a number of changes of the best layouts so far, which are in order; each is sorted."""
-
-
 def improved(
     guesses: Guesses,
     begin_with: Iterable[Layout],
     most: int,
     rng: np.random.Generator,
     tell: Callable[[float], None] = lambda _: None,
-    change: Changer | None = None,
 ) -> list[Layout]:
     """Return all layouts of a search by predictions alone, the best first.
 
-    The search starts from given layouts, then changes the best so far by one or two moves.
+    The search starts from given layouts, then changes the best so far (`BatchMoves`).
 
     Args:
         guesses: The predictions, which it extends.
@@ -116,22 +114,16 @@ def improved(
         most: Largest number of further layouts.
         rng: Draws the changes.
         tell: Called with the share that is done.
-        change: What changes every other batch of layouts in the place of moves.
     """
     guesses.loads([tuple(sorted(layout)) for layout in begin_with])
-    moves, end = Moves(guesses.case.scenario), guesses.count + most
-
-    def moved(best: Sequence[Layout], count: int, rng: np.random.Generator) -> list[Layout]:
-        return [moves.near_best(best, rng) for _ in range(count)]
-
-    in_turn = cycle([moved] if change is None else [change, moved])
+    moves, end = BatchMoves(guesses.case.scenario), guesses.count + most
     # Moves may lead back to known layouts, which add none: a bound on the tries ends the search on
     # small sites.
     tries = 0
     while guesses.count < end and tries < 4 * most:
         tell(1.0 - (end - guesses.count) / most)
-        best = guesses.ranked()[:_KEPT]
-        changed = next(in_turn)(best, min(_BATCH, end - guesses.count), rng)
+        best = guesses.ranked()[:_GUESSED]
+        changed = moves.near_best(best, min(_BATCH, end - guesses.count), rng)
         guesses.loads(changed)
         tries += len(changed)
     return guesses.ranked()
@@ -177,11 +169,11 @@ class SurrogateSearch(Search):
     surrogate: Surrogate | None = field(default=None, repr=False)
     agent: SamplingAgent | None = field(default=None, repr=False)
     digest: str = ""
-    changes: int = 300
+    changes: int = 1000
     ranked: int = 16
-    guesses: int = 600
+    guesses: int = 1500
     agent_draws: int = 64
-    drawn: int = 16
+    drawn: int = 32
     guessed_share: float = 0.4
     drawn_share: float = 0.3
     name: str = "surrogate"
@@ -321,11 +313,11 @@ class SurrogateSearch(Search):
         for number in range(share):
             try_best(found[:_POOL])
             try_best(ruled[number : number + 1] or found[:_POOL])
-        moves = Moves(scenario)
+        moves = BatchMoves(scenario)
         # 4. Changes of the best by corrected predictions; the session ends it by its budget.
         while True:
             best = estimates.ranked()[:_KEPT]
-            try_best([moves.near_best(best, session.rng) for _ in range(self.drawn)])
+            try_best(moves.near_best(best, self.drawn, session.rng))
 
 
 def packaged_search() -> SurrogateSearch:
