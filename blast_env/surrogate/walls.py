@@ -70,8 +70,8 @@ class SurrogateSite:
                 for box in structure.boxes_m
             ]
         ).reshape(-1, 5)
-        needed = CLOSE if self.counts_peaks else WIDE
-        self._points = WallPoints.on(self.protected, air_m, spacing or needed)
+        self._spacing = spacing or (CLOSE if self.counts_peaks else WIDE)
+        self._points = WallPoints.on(self.protected, air_m, self._spacing)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
         self._terraces = list(filter(attrgetter("carries"), scenario.structures))
         self._boxes: dict[Element, Box | None] = {}  # none of a measure
@@ -118,7 +118,8 @@ class SurrogateSite:
             left = tuple(own for own in scenario.structures if own.name not in away)
             zone = scenario.zone.model_copy(update={"removable": ()})
             changed = {"site": site, "structures": left, "build_zone": zone}
-            self._left[away] = SurrogateSite(scenario.model_copy(update=changed), self.memory)
+            own = scenario.model_copy(update=changed)
+            self._left[away] = SurrogateSite(own, self.memory, self._spacing)
         return self._left[away]
 
     def hidden(self, layouts: Sequence[Sequence[Element]]) -> BoolArray | None:
