@@ -4,7 +4,7 @@ import inspect
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import gymnasium as gym
 import pytest
@@ -138,6 +138,7 @@ def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:
         ("learning_rate=0", "above 0"),
         ("batch_size=100", "must divide n_steps * n_envs = 512"),
         ("policy=MlpPolcy", "CnnPolicy"),
+        ("policy_kwargs.rows=3", "no hyperparameter|no setting"),
         ('env_wrapper=[{"os.system": {"size": 1}}]', "ThreatPool"),
     ],
 )
@@ -148,6 +149,13 @@ def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> N
             "BlastBarrier-v0",
             parse_options([option], hyperparameter_keys()),
         )
+
+
+def test_arguments_that_a_policy_does_not_take_are_refused() -> None:
+    """The run's configuration would say a width that its network does not have."""
+    changes: dict[str, Any] = {"policy": "MlpPolicy", "policy_kwargs.width": 8}
+    with pytest.raises(BlastEnvError, match=r"policy_kwargs\.width has no effect on MlpPolicy"):
+        load_hyperparameters("ppo", "BlastBarrier-v0", changes)
 
 
 def test_an_unknown_algorithm_is_refused_with_the_nearest() -> None:

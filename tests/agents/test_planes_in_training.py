@@ -40,9 +40,8 @@ def configuration(scenario: Scenario, observation: str, policy: str | None) -> R
     settings = TrainingSettings.model_validate(
         {"algorithm": "maskable_ppo", "scenario": "a", "steps": 8, "observation": observation}
     )
-    changes: dict[str, Any] = {"n_envs": 1, "n_steps": 2, "batch_size": 2, "policy_kwargs.width": 4}
-    if policy is not None:
-        changes["policy"] = policy
+    changes: dict[str, Any] = {"n_envs": 1, "n_steps": 2, "batch_size": 2}
+    changes |= {"policy_kwargs.width": 4} if policy is None else {"policy": policy}
     hyperparameters = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
     return fitted(RunConfiguration(settings, hyperparameters, scenario.content_hash), scenario)
 

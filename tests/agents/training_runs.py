@@ -60,4 +60,7 @@ def hyperparameters(
     changes: Mapping[str, Any] = MappingProxyType({}), algorithm: str = "maskable_ppo"
 ) -> Hyperparameters:
     """Return hyperparameters for the small scenario."""
-    return load_hyperparameters(algorithm, "BlastBarrier-v0", {**SMALL, **changes})
+    small = SMALL
+    if changes.get("policy") in ("MlpPolicy", "CnnPolicy"):  # their networks have other arguments
+        small = {name: value for name, value in SMALL.items() if "policy_kwargs" not in name}
+    return load_hyperparameters(algorithm, "BlastBarrier-v0", {**small, **changes})

@@ -166,6 +166,13 @@ class PolicyArguments(BaseModel):
     finish_bias: Annotated[StrictFloat, Field(ge=-50.0, le=50.0)] = -3.0
 
 
+_OF_SCENARIO: Final = tuple(
+    f"policy_kwargs.{name}" for name in ("rows", "columns", "item_channels")
+)
+"""Arguments that the scenario decides, so that changes of them would have no effect."""
+
+_SPATIAL: Final = "blast_agents.policies.spatial."
+
 _NO_MODEL_ARGUMENTS: Final = (
     *("n_timesteps", "n_envs", "env_wrapper", "policy", "policy_kwargs"),
     *("imitation_updates", "imitation_cases"),
@@ -245,7 +252,7 @@ class Hyperparameters(BaseModel):
 
 def hyperparameter_keys() -> tuple[str, ...]:
     """Return the valid keys of changes, such as `"policy_kwargs.width"`."""
-    return tuple(option_names(Hyperparameters))
+    return tuple(name for name in option_names(Hyperparameters) if name not in _OF_SCENARIO)
 
 
 def hyperparameter_file(algorithm: str) -> Path:
@@ -274,7 +281,8 @@ def load_hyperparameters(
 
     Raises:
         UnknownNameError: If the algorithm or a key is unknown; the message names the nearest one.
-        BlastEnvError: If a value is invalid; the message names its bound.
+        BlastEnvError: If a value is invalid; the message names its bound. Or if the policy takes no
+            such argument.
     """
     path = hyperparameter_file(algorithm)
     sections = yaml.safe_load(path.read_text(encoding="utf-8"))  # our own file, with aliases
@@ -283,6 +291,13 @@ def load_hyperparameters(
     if envs is not None:
         values["n_envs"] = envs
     try:
-        return Hyperparameters.model_validate(values)
+        found = Hyperparameters.model_validate(values)
     except ValidationError as error:
         raise BlastEnvError(f"hyperparameters: {described(error)}") from error
+    of_policy = [name for name in changes if name.startswith("policy_kwargs.")]
+    if of_policy and not found.policy.startswith(_SPATIAL):
+        raise BlastEnvError(
+            f"hyperparameters: {of_policy[0]} has no effect on {found.policy}, whose network is"
+            f" that of stable-baselines3; it is for the policies of {_SPATIAL[:-1]}"
+        )
+    return found
