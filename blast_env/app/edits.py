@@ -9,11 +9,20 @@ from enum import StrEnum
 from math import hypot
 from typing import Any, Final, NamedTuple
 
+import shapely
+
 from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.sections import PointM
-from blast_env.site import SCHEMA_VERSION, AnySource, RectangleSource, Scenario, VehicleSource
+from blast_env.site import (
+    SCHEMA_VERSION,
+    AnySource,
+    AnyStructure,
+    RectangleSource,
+    Scenario,
+    VehicleSource,
+)
 from blast_env.site.sources import CHARGE_PRESETS, SegmentSource
 from blast_env.site.structures import ground_below_m
 from blast_env.site.zone import source_bounds_m
@@ -167,8 +176,18 @@ def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Site
         is_charge = thing.kind is ThingKind.CHARGE
         if is_charge and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m:
             continue
+        if thing.kind is ThingKind.STRUCTURE and not _is_on(
+            scenario.structures[thing.number], x_m, y_m
+        ):
+            continue
         return thing
     return None
+
+
+def _is_on(structure: AnyStructure, x_m: float, y_m: float) -> bool:
+    """Return whether a place in the rectangle around a structure is on it: in no courtyard."""
+    outline = structure.footprint
+    return outline is None or bool(shapely.intersects_xy(outline.polygon, x_m, y_m))
 
 
 def _from_the_top(scenario: Scenario) -> list[SiteThing]:

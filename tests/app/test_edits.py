@@ -10,6 +10,7 @@ from blast_env.app import edits
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario, ScenarioError, load_scenario
+from tests import builders
 from tests.gas_sites import hut
 from tests.test_terraces import HALL, TERRACE, terraced
 
@@ -119,6 +120,21 @@ def test_heights_come_and_go() -> None:
 )
 def test_what_is_on_top_is_what_one_points_at(place: Any, expected: SiteThing | None) -> None:
     assert edits.thing_at(COURTYARD, place[0], place[1], 0.5) == expected
+
+
+def test_a_house_in_the_courtyard_of_another_is_found() -> None:
+    """The rectangle around a polygon has other houses in it."""
+    kiosk = builders.block("kiosk", 18.0, 12.0, 4, 4, height_m=3.0, protected=True)
+    ring = {
+        "kind": "polygon",
+        "name": "ring",
+        "outline_m": [[10.0, 5.0], [30.0, 5.0], [30.0, 25.0], [10.0, 25.0]],
+        "courtyards_m": [[[14.0, 9.0], [26.0, 9.0], [26.0, 21.0], [14.0, 21.0]]],
+        "height_m": 6.0,
+    }
+    site = builders.site("s", (40.0, 30.0), builders.point(3.0, 3.0), kiosk, ring)
+    found = [edits.thing_at(site, x, 13.0, 0.5) for x in (12.0, 16.0, 19.0)]
+    assert found == [SiteThing(ThingKind.STRUCTURE, 1), None, SiteThing(ThingKind.STRUCTURE, 0)]
 
 
 def test_a_square_stays_a_square() -> None:
