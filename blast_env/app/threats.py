@@ -5,9 +5,11 @@ from math import cbrt
 from typing import Final
 
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.places import nearest_place
 from blast_env.sections import PointM
 from blast_env.site import RectangleSource, Scenario, SegmentSource, VehicleCharge, VehicleSource
 from blast_env.site.blast_site import Charge
+from blast_env.units import MODULE_SIDE_M
 from blast_env.vehicles.worst_places import stand_off_m
 
 MOST_USUAL: Final = 4
@@ -19,11 +21,11 @@ _NEAREST: Final = ", as near as it comes"
 def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
     """Return the charges that layouts of a site are tested against.
 
-    Of a line: the middle and the ends; of an area: the middle and the corners; of a vehicle: the
-    nearest place that the layout leaves it, and the next ones by distance.
+    Of a line: the middle and the ends; of an area: the middle and the corners; of both the place
+    nearest to an assessed wall, if it is nearer than these; of a vehicle: the nearest place that
+    the layout leaves it, and the next ones by distance.
     """
-    # Ends and middle of a line, corners and middle of an area: the extremes of distance to any wall
-    # lie among them or near.
+    walls = scenario.loaded_walls
     named: list[LoadCase] = []
     for index, source in enumerate(scenario.charge):
         places: list[tuple[str, PointM]]
@@ -45,6 +47,10 @@ def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
             continue
         else:
             places = [("", source.position_m)]
+        nearest_m = nearest_place(scenario, source)
+        least_m = min(stand_off_m(walls, at_m) for _, at_m in places)
+        if stand_off_m(walls, nearest_m) < least_m - MODULE_SIDE_M:
+            places.append((_NEAREST, nearest_m))
         named += [
             LoadCase(
                 name=f"charge {index + 1}{words}",

@@ -8,20 +8,21 @@ import numpy as np
 
 from blast_env.evaluation.blasts import Severity
 from blast_env.evaluation.cases import LoadCase
-from blast_env.geometry import Layout, Rectangle
+from blast_env.geometry import Layout, WallLine
+from blast_env.sections import PointM
 from blast_env.site import (
     AnyCharge,
     PointSource,
-    RectangleSource,
     Scenario,
     SegmentSource,
     VehicleCharge,
     VehicleSource,
 )
 from blast_env.site.blast_site import Charge
+from blast_env.site.sources import PlaceSource
+from blast_env.vehicles.worst_places import least_distances_m
 
-_STEPS: Final = 400
-"""Number of parts of a segment in the search for its place nearest to a building."""
+_MILLIMETRES: Final = 3  # digits
 
 
 def place_text(threat: LoadCase, scenario: Scenario, layout: Layout) -> str:
@@ -64,7 +65,7 @@ def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
     There are `count` places of each segment and vehicle, and along each side of an area. The place
-    of each source nearest to a protected structure is added. Those of a vehicle are at its worst
+    of each source nearest to an assessed wall is added. Those of a vehicle are at its worst
     place, its second worst, and so on.
     """
     found: dict[AnyCharge, LoadCase] = {}
@@ -76,8 +77,7 @@ def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
                 name = f"vehicle, place {rank + 1} by distance"
                 found.setdefault(vehicle, LoadCase(vehicle, 0, name, why, index))
             continue
-        nearest = min(_candidates(scenario, source), key=lambda own: _distance_m(scenario, own))
-        for place in (*_spread(source, count), nearest):
+        for place in (*_spread(source, count), nearest_place(scenario, source)):
             charge = Charge(place, source.tnt_kg, source.height_m)
             found.setdefault(charge, LoadCase(charge, 0, _place_text(charge), why, index))
     return tuple(found.values())
@@ -95,24 +95,24 @@ def _place_text(charge: Charge) -> str:
     return f"({x_m:.1f}, {y_m:.1f}) m"
 
 
-Placed = PointSource | SegmentSource | RectangleSource
-"""Sources whose places do not depend on the layout."""
+def nearest_place(scenario: Scenario, source: PlaceSource) -> PointM:
+    """Return the place of a source nearest to an assessed wall; of several, to a wall's middle."""
+    boxes_m = [
+        (*wall.start_m, *wall.end_m) if isinstance(wall, WallLine) else wall
+        for wall in scenario.loaded_walls
+    ]
+    # The nearest pair of two lines, or of a line and an area, has an end or corner of one of them.
+    ends_m = np.array(boxes_m, dtype=np.float64).reshape(-1, 2, 2)
+    middles_m = ends_m.mean(axis=1)
+    points_m = np.concatenate((middles_m, ends_m.reshape(-1, 2)))
+    places_m = np.concatenate((source.nearest_m(points_m), [*_spread(source, 2)]))
+    away_m = least_distances_m(scenario.loaded_walls, places_m).round(_MILLIMETRES)
+    off_m = np.linalg.norm(places_m[:, np.newaxis] - middles_m, axis=2).min(axis=1, initial=np.inf)
+    x_m, y_m = places_m[np.lexsort((off_m, away_m))[0]].tolist()
+    return x_m, y_m
 
 
-def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, float]]:
-    """Yield candidates for the place of a source nearest to a protected structure, or nearly so."""
-    if isinstance(source, RectangleSource):
-        left, bottom, right, top = source.rectangle_m
-        for target in _protected(scenario):
-            # The points of the area nearest to the corners of the building.
-            xs_m = {min(max(own, left), right) for own in (target.left, target.right)}
-            ys_m = {min(max(part, bottom), top) for part in (target.bottom, target.top)}
-            yield from ((x_m, y_m) for x_m in xs_m for y_m in ys_m)
-        return
-    yield from _spread(source, _STEPS + 1)
-
-
-def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
+def _spread(source: PlaceSource, count: int) -> Iterator[tuple[float, float]]:
     shares = np.linspace(0.0, 1.0, count).tolist() if count > 1 else [0.5]
     if isinstance(source, PointSource):
         yield source.position_m
@@ -125,12 +125,3 @@ def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
         for across in shares:
             for along in shares:
                 yield left + across * (right - left), bottom + along * (top - bottom)
-
-
-def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
-    return min(rectangle_m.distance_to(place) for rectangle_m in _protected(scenario))
-
-
-def _protected(scenario: Scenario) -> list[Rectangle]:
-    structures = (structure for structure in scenario.structures if structure.protected)
-    return [box_m for structure in structures for box_m in structure.boxes_m]

@@ -44,6 +44,7 @@ from blast_env.evaluation.record import BlastRecord
 from blast_env.geometry import Layout
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge, Scenario, load_scenario
+from tests import builders
 from tests.app.here import Here, rows_of
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
@@ -388,6 +389,16 @@ def test_threats_have_places_that_one_can_point_to() -> None:
     ]
     assert courtyard[1].charge == Charge((5.0, 6.0), 100.0)
     assert [threat.name for threat in threats_of(hut())] == ["charge 1"]
+
+
+def test_a_long_street_has_a_threat_where_it_passes_the_building(tmp_path: Path) -> None:
+    """Its middle and its ends are 10 m and more farther away."""
+    target = builders.block("office", 20.0, 20.0, 20, 20, height_m=6.0, protected=True)
+    street = {"kind": "segment", "start_m": [3.0, 10.0], "end_m": [99.0, 10.0], "tnt_kg": 50.0}
+    site = builders.site("street", (100.0, 40.0), street, target)
+    names = {threat.name: threat.charge for threat in threats_of(site)}
+    assert names["charge 1, as near as it comes"] == Charge((25.0, 10.0), 50.0)
+    assert session_on(tmp_path, site).threats == ("charge 1, as near as it comes",)
 
 
 @pytest.mark.usefixtures("without_pictures")

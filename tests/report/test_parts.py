@@ -43,7 +43,7 @@ def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> 
     first, second = chief_threats(places, severity, 6)
     assert (first.name, second.name) == ("T1", "T2")
     assert (first.charge, second.charge) == (places[1].charge, places[-1].charge)
-    assert first.why == ("charge source 1, the worst with the layout of 4 places examined")
+    assert first.why == ("charge source 1, the worst with the layout of 3 places examined")
     assert [chief_threat.charge for chief_threat in chief_threats(places, severity, 1)] == [
         first.charge
     ]
@@ -83,9 +83,15 @@ def test_other_places_are_spread_over_every_source() -> None:
     places = other_places(site, 3)
     along_m = [place.charge_against(site).position_m for place in places[:3]]
     assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
-    assert 3.0 <= places[3].charge_against(site).position_m[1] <= 5.0  # before the hut
-    assert len(places) == 4 + 9  # the second road has the same places, the yard its nearest corner
-    assert {place.charge.tnt_kg for place in places[4:]} == {1.0}
+    # The middle is nearest to the hut, the second road has the same places, the yard its corner.
+    assert len(places) == 3 + 9
+    assert {place.charge.tnt_kg for place in places[3:]} == {1.0}
+
+
+def test_the_nearest_place_of_a_street_along_a_wall_is_before_its_middle() -> None:
+    site = site_with(ROAD | {"start_m": [1.0, 2.5], "end_m": [1.0, 7.0]})
+    last = other_places(site, 3)[-1].charge_against(site)
+    assert last.position_m == (1.0, 4.0)
 
 
 def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
