@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from blast_env.answers.assess import impulse_lines
+from blast_env.answers.assess import impulse_lines, no_cells_words
 from blast_env.answers.document import (
     AnyPart,
     Line,
@@ -41,6 +41,8 @@ def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
     error = judge.error(best.layout)
     if error is not None:
         yield from impulse_lines(error)
+    else:
+        yield Line.of(f"{no_cells_words(judge.engine)}; probabilities leave it out", kind="quiet")
     rows = []
     for own in found.found:
         seen = judge.judged[own.layout]

@@ -21,6 +21,7 @@ from blast_env.answers.document import (
 )
 from blast_env.answers.pieces import pieces_answer
 from blast_env.evaluation.blasts import Blasts, NumberOf
+from blast_env.evaluation.engines.contract import Engine
 from blast_env.evaluation.questions.capacity import LEVELS, Edge, PlaceCapacity
 from blast_env.evaluation.questions.grid_error import (
     FACTOR,
@@ -101,6 +102,8 @@ def assessment(
     if error is not None:
         yield from impulse_lines(error)
         yield from lines(_levels_changed(blasts, judged))
+    else:
+        yield Line.of(f"{no_cells_words(blasts.engine)}; probabilities leave it out", kind="quiet")
     yield response_table(blasts, found)
     said = [*judged.notes, *_engine_notes(blasts, blasts.judged)]
     for name, own in [*found.items()][:-1]:
@@ -159,6 +162,16 @@ def cells_words(error: GridError) -> str:
         f"(cells): grid convergence index against {error.coarser.words}, under the worst charge"
         f" (factor {FACTOR:g}, order {ORDER:g})"
     )
+
+
+def no_cells_words(engine: Engine) -> str:
+    """Return that the grid error is not known; empty for an engine without cells."""
+    if not engine.smallest_m:
+        return ""
+    why = "no blast ran on cells twice as large"
+    if engine.coarser is None:
+        why = f"cells twice as large as those of {engine.smallest_m:g} m do not fit into a module"
+    return f"(cells): the grid error is not known: {why}"
 
 
 def impulse_lines(error: GridError) -> Iterator[Line]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.answers.assess import cells_words
+from blast_env.answers.assess import cells_words, no_cells_words
 from blast_env.answers.document import (
     TYPOGRAPHIC,
     AnyPart,
@@ -168,3 +168,5 @@ def means(
         yield Line.of(f"{words}: mean ", number, f", {worst}", Number.load(objective, cvar))
     if found.grid_error is not None:
         yield Line.of(cells_words(found.grid_error), kind="quiet")
+    elif words := no_cells_words(found.engine):
+        yield Line.of(words, kind="quiet")

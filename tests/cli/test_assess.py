@@ -15,6 +15,7 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.questions import capacity
 from blast_env.evaluation.questions.probability import scaled_to
 from blast_env.evaluation.questions.verdict import Consequences, consequences_of
+from blast_env.layout import write_layout
 from blast_env.response import LevelOfProtection
 from blast_env.site import Charge, Scenario
 from tests.gas_sites import WALL, glazed_hut
@@ -119,6 +120,22 @@ def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
     panes = [line for line in output.splitlines() if line.startswith(("no barrier", "6 barrier"))]
     assert all(" +- " in pane for pane in panes)
     assert len(panes) == 2
+
+
+def test_an_error_of_the_cells_that_is_not_known_is_named(tmp_path: Path) -> None:
+    """It dropped out without a word, and counted as none in the probability."""
+    path, layout = tmp_path / "hut.toml", tmp_path / "layout.json"
+    blast_env.save_scenario(glazed_hut(), path)
+    write_layout(layout, glazed_hut(), WALL, {})
+    words = (
+        "(cells): the grid error is not known: cells twice as large as those of 0.5 m do not fit"
+        " into a module"
+    )
+    said = run(path, "--layout", layout, "--cell", "0.5").splitlines()
+    assert f"{words}; probabilities leave it out" in said
+    asked = ("evaluate", "--scenario", path, "--layout", layout, "--cell", "0.5")
+    done = CliRunner().invoke(app, [*map(str, asked)])
+    assert words in done.output.splitlines()
 
 
 def test_a_verdict_names_how_many_fixed_charges_it_leaves_out(tmp_path: Path) -> None:
