@@ -18,8 +18,13 @@ from blast_env.answers import Document, Line, Table, assess, compare
 from blast_env.answers.report import Limit, Report, StudyOptions, report_document, run_report
 from blast_env.benchmark import Definition, make
 from blast_env.cli import app
-from blast_env.design.search import DesignProblem, PopulationAnnealingSearch, RandomSearch
-from blast_env.design.search.advice import MeasureKind, advise
+from blast_env.design.search import (
+    DesignProblem,
+    MeasureKind,
+    PopulationAnnealingSearch,
+    RandomSearch,
+    advise,
+)
 from blast_env.design.search.advised import site_with_target
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
