@@ -312,10 +312,13 @@ def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | No
         )
     if not threats:
         return None
+    # By the risk measure of the search. Those of a known charge are its realisations.
+    realisations = 1 if is_hidden else len(threats)
+    case = LoadCaseSet(problem.scenario, threats, realisations, problem.case.risk)
     with progress_bar(f"check on {len(threats)} other threats") as progress:
         return compare(
             problem.evaluator,
-            [LoadCaseSet(problem.scenario, threats)],
+            [case],
             [run.result.layout],
             problem.processes,
             progress=progress,

@@ -11,9 +11,10 @@ from blast_agents.packaged import search_from_agent
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
+from blast_env.answers import Number
 from blast_env.cli import app
 from blast_env.design.search import DesignProblem, find_proposer
-from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, SeedRange, draw_threats
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.event import EventRun
@@ -76,6 +77,23 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
     listed = json.loads((out / "layout.json").read_text())["provenance"]["threats"]
     assert [name["seed"] for name in listed] == [threat.seed for threat in threats]
     assert len({tuple(name["charge_position_m"]) for name in listed}) == 3
+
+
+def test_held_out_threats_are_combined_as_those_of_the_search(tmp_path: Path) -> None:
+    """The row had been of the mean, under the title of the largest."""
+    road = SegmentSource(kind="segment", start_m=(2.0, 1.0), end_m=(2.0, 7.0), tnt_kg=5.0)
+    scenario = hut().model_copy(update={"charge": (road,)})
+    save_scenario(scenario, tmp_path / "site.toml")
+    options = ("--threat", "hidden", "--threats", 2, "--budget", 2, "--held-out", 3, "--cell", 0.5)
+    site = ("--scenario", tmp_path / "site.toml", "--method", "random", "--engine", "gas")
+    result = search(*site, "--risk", "worst", *options)
+    assert result.exit_code == 0, result.output
+    assert "largest impulse of the protected structures" in result.stdout
+    threats = draw_threats(scenario, SeedRange.TEST.seeds(0, 3))
+    loads = BlastEvaluator(scenario).loads_of_many(((), threat) for threat in threats)
+    largest = max(load.protected_impulse_pa_s for load in loads)
+    (row,) = (line for line in result.stdout.splitlines() if line.startswith("held out"))
+    assert row.split()[3] == Number(largest).text()
 
 
 def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
