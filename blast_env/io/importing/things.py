@@ -17,6 +17,8 @@ from blast_env.io.importing.options import CHARGE_KEYS, length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
+_MITRE: Final = 1.5
+"""Farthest corner of a kerb over its distance from the street's line: a right angle has 1.41."""
 
 
 class Role(StrEnum):
@@ -96,7 +98,7 @@ class Thing:
             return
         for side in (aside_m, -aside_m):
             yield from shapely.get_parts(
-                shapely.offset_curve(self.geometry, side, join_style="mitre")
+                shapely.offset_curve(self.geometry, side, join_style="mitre", mitre_limit=_MITRE)
             )
 
 

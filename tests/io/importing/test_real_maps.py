@@ -277,6 +277,23 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
     assert any("lies over 1 parts of streets" in note for note in wide.notes)
 
 
+@pytest.mark.parametrize("turn_deg", [15.0, 40.0, 60.0, 90.0, 150.0])
+def test_a_kerb_keeps_to_its_street_at_a_hairpin(turn_deg: float, tmp_path: Path) -> None:
+    """Mitres had run on to five times the distance: 18 m beyond a kerb."""
+    turn = np.radians(turn_deg)
+    ways = [(5.0, 45.0), (45.0, 45.0)]
+    ways.append((45.0 - 40.0 * float(np.cos(turn)), 45.0 + 40.0 * float(np.sin(turn))))
+    around = outline(rectangle(0, 0, 110, 100), kind="site")
+    house = outline(rectangle(5, 5, 20, 10), name="House")
+    path = written(tmp_path, around, house, line(ways, highway="residential", width="12"))
+    site = imported(path, protect=("House",), rotation_deg=0.0)
+    sources = (own for own in site.scenario.charge if not isinstance(own, RectangleSource))
+    ends_m = [end for source in sources for line_m in source.lines_m for end in line_m]
+    away_m = shapely.distance(shapely.LineString(ways), shapely.points(ends_m))
+    assert away_m.max() < 9.0  # the corner of a kerb 5 m from the line
+    assert away_m.max() > 4.99
+
+
 def test_widths_of_streets_are_those_of_their_lanes_or_guessed(tmp_path: Path) -> None:
     tags: dict[str, dict[str, str]] = {"way 3": {"lanes": "4"}, "way 4": {}}
     extract = town()
