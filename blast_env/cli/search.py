@@ -1,6 +1,6 @@
 """`blast-env search`: the layout with the least load, for a budget of blasts, or for none."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
@@ -325,6 +325,10 @@ def _check(run: SearchRun, held_out: int, *, is_hidden: bool) -> Evaluation | No
         )
 
 
+_FIGURE, _HISTORY, _FRONT = "search.png", "history.csv", "front.csv"
+"""Files in the folder of `--out` that not every search has."""
+
+
 def _write_search(
     run: SearchRun, options: Mapping[str, Any], checked: Evaluation | None, out: Path
 ) -> None:
@@ -334,11 +338,19 @@ def _write_search(
     provenance = _provenance(run, options, checked)
     written = _write_layout(scenario, result.layout, provenance, out)
     if result.history:
-        written += save_pictures((out / "search.png", partial(_figure, run)))
-        written.append(write_csv(result.history_table(), out / "history.csv"))
+        written += save_pictures((out / _FIGURE, partial(_figure, run)))
+        written.append(write_csv(result.history_table(), out / _HISTORY))
     if result.front:
-        written.append(write_csv(result.front_table(), out / "front.csv"))
+        written.append(write_csv(result.front_table(), out / _FRONT))
     print_written(written)
+    _note_older(out, written)
+
+
+def _note_older(out: Path, written: Collection[Path]) -> None:
+    """Say which files in a folder of results are of an earlier search: they stay there."""
+    for name in (_FIGURE, _HISTORY, _FRONT):
+        if out / name not in written and (out / name).exists():
+            print_line(f"note: {out / name} is of an earlier search")
 
 
 def _write_layout(
@@ -423,6 +435,7 @@ def _proposal_without_blasts(
         make_folder(out)
         provenance = {**digests, "command": command(), "versions": versions()}
         print_written(_write_layout(scenario, result.layout, provenance, out))
+        _note_older(out, ())
     return problem, result.layout
 
 

@@ -27,6 +27,11 @@ from tests.gas_sites import hut
 CHARGE = Charge((5.0, 20.5), 100.0)
 
 
+def search_without_blasts(*arguments: str | Path) -> Result:
+    """Run the command for a proposal by guesses."""
+    return CliRunner().invoke(app, ["search", "--method", "package", *map(str, arguments)])
+
+
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
     path = tmp_path / "site.toml"
@@ -94,6 +99,19 @@ def test_held_out_threats_are_combined_as_those_of_the_search(tmp_path: Path) ->
     largest = max(load.protected_impulse_pa_s for load in loads)
     (row,) = (line for line in result.stdout.splitlines() if line.startswith("held out"))
     assert row.split()[3] == Number(largest).text()
+
+
+def test_files_of_an_earlier_search_beside_another_layout_are_named(tmp_path: Path) -> None:
+    save_scenario(hut(), tmp_path / "hut.toml")
+    out = tmp_path / "out"
+    options = ("--scenario", tmp_path / "hut.toml", "--engine", "gas", "--cell", 0.5, "--out", out)
+    first = search("--method", "nsga2", *options, "--budget", 2)
+    assert "is of an earlier search" not in first.stdout
+    again = search("--method", "random", *options, "--budget", 2)
+    assert f"note: {out / 'front.csv'} is of an earlier search" in again.stdout
+    assert again.stdout.count("is of an earlier search") == 1
+    proposed = search_without_blasts("--scenario", tmp_path / "hut.toml", "--out", out)
+    assert proposed.stdout.count("is of an earlier search") == 3
 
 
 def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:

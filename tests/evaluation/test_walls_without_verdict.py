@@ -33,7 +33,11 @@ from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.questions import capacity
 from blast_env.evaluation.questions.probability import scaled_to
-from blast_env.evaluation.questions.verdict import consequences_by_layout, consequences_of
+from blast_env.evaluation.questions.verdict import (
+    Consequences,
+    consequences_by_layout,
+    consequences_of,
+)
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import write_layout
 from blast_env.response import LevelOfProtection
@@ -243,6 +247,18 @@ def test_the_worst_charge_is_found_where_a_building_is_hidden_under_another(cach
     assert hidden.worst_number == 1
     assert hidden.under(0).buildings == ("house",)
     assert hidden.under(1).buildings == ("front", "house")
+
+
+def test_no_more_panes_break_than_there_are_where_pieces_hide_some_under_one_charge(
+    cache: Path,
+) -> None:
+    """As by pieces that fall under the other; the first charge had the number of panes."""
+    scenario = site("other")
+    half, bare = (consequences_of(blasts_of(scenario, layout, cache)) for layout in (WALLS[:1], ()))
+    whole = Consequences.together((half, bare)).summary("front")
+    assert half.summary("front").panes < bare.summary("front").panes == whole.panes
+    assert whole.panels == bare.summary("front").panels
+    assert whole.failed <= whole.panels
 
 
 @pytest.mark.parametrize("method", [RandomSearch(initial=(WALLS,)), PopulationAnnealingSearch()])

@@ -426,17 +426,19 @@ class Consequences:
     def summary(self, building: str) -> BuildingSummary:
         """Return the response of a building under the worst charge, number by number."""
         found = [own.facade for own in self.of(building)]
-        walled = len(found[0].walled)
+        # Pieces that stand under one charge and fall under another hide some bays from it alone.
+        panes, walled = (
+            max(facade.panes for facade in found),
+            max(len(facade.walled) for facade in found),
+        )
         hazardous = [
             [level >= DamageLevel.HAZARDOUS for level in facade.walls.levels] for facade in found
         ]
         return BuildingSummary(
             level=self.level_words(building),
             broken=max(facade.broken_panes for facade in found),
-            panes=found[0].panes,
-            condition=max(facade.worst_condition for facade in found).words
-            if found[0].panes
-            else _NONE,
+            panes=panes,
+            condition=max(facade.worst_condition for facade in found).words if panes else _NONE,
             failed=max(map(sum, hazardous)),
             panels=walled,
             damage=max(facade.worst_damage for facade in found).name.lower() if walled else _NONE,
