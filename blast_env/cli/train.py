@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -9,6 +10,7 @@ import numpy as np
 import typer
 
 from blast_env.answers.terminal import print_line
+from blast_env.bundled import GENERATED
 from blast_env.cli.command import writes
 from blast_env.cli.interruptions import Interruptions
 from blast_env.cli.options import (
@@ -30,6 +32,7 @@ from blast_env.cli.output import (
 )
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.cases import has_few_places
 from blast_env.evaluation.engines import default_engine
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
@@ -208,9 +211,12 @@ def _print_result(result: "TrainingResult") -> None:
         f"in {last.seconds:,.0f} s"
     )
     if best is not None:
+        is_one = settings.scenario not in GENERATED and has_few_places(scenario)
+        what = "the site's charges" if is_one else "held-out threats"
+        interval = f" (95 % interval {best.low:.1%} to {best.high:.1%})"
         print_line(
-            f"best on held-out threats, after {best.timesteps:,} steps: reduction "
-            f"{best.reduction:.1%} (95 % interval {best.low:.1%} to {best.high:.1%})"
+            f"best on {what}, after {best.timesteps:,} steps: reduction {best.reduction:.1%}"
+            f"{'' if isnan(best.low) else interval}"
         )
     print_written((folder.best_model, folder.evaluations, folder.learning_curve))
     draw = partial(_proposal, folder, scenario, settings.threat)

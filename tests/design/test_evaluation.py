@@ -78,3 +78,16 @@ def test_fixed_charges_come_in_turn_in_training_and_selection() -> None:
         met = {case.charge.position_m for case in cases if isinstance(case.charge, Charge)}
         assert met == set(places)
     assert len(training_cases(SETTINGS, source, 9)) == 3
+
+
+@pytest.mark.parametrize(("engine", "count"), [("event", 9), ("gas", 3)])
+def test_a_fixed_charge_again_is_no_evidence_without_noise(engine: str, count: int) -> None:
+    """Sixteen evaluations at three places gave an interval a sixth as wide."""
+    places = ((3.0, 6.5), (3.0, 9.0), (3.0, 11.5))
+    points = tuple(PointSource(kind="point", position_m=place, tnt_kg=20.0) for place in places)
+    site = SingleScenario(small_scenario().model_copy(update={"charge": points}))
+    chosen = SETTINGS.model_copy(update={"evaluation_cases": 9, "evaluation_engine": engine})
+    for threat in ("visible", "hidden"):
+        cases = Selection.of(chosen.model_copy(update={"threat": threat}), site).cases
+        assert len(cases) == count
+        assert len({case.threats[0].charge for case in cases}) == 3

@@ -17,7 +17,7 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
-from blast_env.evaluation.cases import in_turn
+from blast_env.evaluation.cases import in_turn, judged_threats
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
 
@@ -38,7 +38,8 @@ class Selection:
     def of(cls, settings: TrainingSettings, source: ScenarioSource) -> "Selection":
         """Draw the cases of a run, which depend only on the settings.
 
-        Generated sites are the last ones of the held-out sites.
+        Generated sites are the last ones of the held-out sites. Of a site with a few fixed charges
+        there are as many cases: a charge again is no further evidence without noise.
 
         Args:
             settings: Settings of the run.
@@ -109,13 +110,15 @@ def training_cases(
 def _cases(
     settings: TrainingSettings, scenarios: Sequence[Scenario], seeds: Sequence[int]
 ) -> tuple[LoadCaseSet, ...]:
-    """Return one case with one threat per scenario and seed."""
-    pairs = zip(scenarios, seeds, strict=True)
-    threats = [draw_threats(scenario, [seed])[0] for scenario, seed in pairs]
+    """Return one case with one threat per scenario and seed; a fixed charge of one site once."""
     if all(scenario is scenarios[0] for scenario in scenarios):
-        threats = [*in_turn(scenarios[0], threats)]
+        found = judged_threats(scenarios[0], seeds, has_noise=settings.judge.has_noise)
+        pairs = [(scenarios[0], threat) for threat in found]
+    else:
+        drawn = zip(scenarios, seeds, strict=True)
+        pairs = [(scenario, draw_threats(scenario, [seed])[0]) for scenario, seed in drawn]
     cases = []
-    for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):
+    for number, (scenario, threat) in enumerate(pairs, start=1):
         known_charge = threat.charge if settings.threat == "visible" else None
         cases.append(
             LoadCaseSet(scenario, (threat,), charge=known_charge, name=f"{scenario.name} {number}")

@@ -108,12 +108,15 @@ def read_evaluations(path: Path) -> list[EvaluationRow]:
         raise BlastEnvError(f"{path}: is damaged: {reason}") from error
 
 
-def check_judging(rows: Sequence[EvaluationRow], settings: TrainingSettings, place: Path) -> None:
+def check_judging(
+    rows: Sequence[EvaluationRow], settings: TrainingSettings, cases: int, place: Path
+) -> None:
     """Refuse settings by which further evaluations would not compare with those of a run.
 
     Args:
         rows: The evaluations of the run.
         settings: Its settings now.
+        cases: Number of cases of an evaluation.
         place: The run folder, for the error.
 
     Raises:
@@ -122,7 +125,9 @@ def check_judging(rows: Sequence[EvaluationRow], settings: TrainingSettings, pla
     said = next((row.judging for row in rows if row.judging), "")
     with refusing(place):
         before = checked_as(dict[str, Any], parse_json(said or "{}"))
-    now = settings.judging
+    now = settings.judging | {"number of results": cases}
+    if rows:
+        before["number of results"] = len(rows[-1].results)
     for name, value in before.items():
         if now.get(name) != value:
             raise BlastEnvError(
@@ -216,7 +221,7 @@ def learning_curve(
         f"{settings.threat} threat",
         f"seed {settings.seed}, {last.timesteps:,} steps, {last.episodes:,} episodes, "
         f"{last.blasts:,} {spent} with engine {settings.engine}, {last.seconds:,.0f} s; "
-        f"{settings.evaluation_cases} held-out threats",
+        f"{len(last.results)} threats of evaluations",
     )
     return figure
 

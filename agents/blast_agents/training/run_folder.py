@@ -64,7 +64,8 @@ class TrainingSettings(BaseModel):
         hidden_threats: Charges per episode with a hidden threat. The expected reward does not
             depend on it; with few charges, the same number of blasts covers more layouts.
         evaluation_interval: Rollouts between two evaluations, with a checkpoint each.
-        evaluation_cases: Number of held-out threats of an evaluation.
+        evaluation_cases: Number of held-out threats of an evaluation; of a site with fewer fixed
+            charges, all of these.
         evaluation_engine: Engine that selects the best weights; by default that of the training,
             or gas dynamics if a surrogate trains.
         evaluation_first_seed: Offset of the seeds of these threats within the range for the

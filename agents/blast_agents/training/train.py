@@ -122,8 +122,9 @@ def resume(
     if configuration.settings.scenario in FAMILIES:
         source = scenario_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
-    check_judging(read_evaluations(folder.evaluations), configuration.settings, folder.path)
-    selection = Selection.of(configuration.settings, source)
+    settings, selection = configuration.settings, Selection.of(configuration.settings, source)
+    rows = read_evaluations(folder.evaluations)
+    check_judging(rows, settings, len(selection.cases), folder.path)
     folder.clear_temporaries()
     return _Run(folder, configuration, source, selection).go_on(progress)
 
