@@ -242,6 +242,7 @@ class Judgement:
         random: Those by random legal actions.
         trained: Those by each trained agent, by its name: algorithm, seed, cost.
         others: Those by any other method.
+        charges: How many of the threats differ; fixed charges of a site are drawn again and again.
     """
 
     site: str
@@ -250,6 +251,7 @@ class Judgement:
     random: FloatArray
     trained: Mapping[str, FloatArray]
     others: Mapping[str, FloatArray] = field(default_factory=dict)
+    charges: int | None = None
 
     @cached_property
     def best_rule(self) -> FloatArray:
@@ -278,7 +280,8 @@ class Judgement:
 
     def lines(self) -> Iterator[str]:
         """Yield a line for each method: mean, 95 % interval, and lead over the best rule."""
-        yield f"{self.site}, judged by {self.judge} on {len(self.random)} threats"
+        different = "" if self.charges is None else f", of which {self.charges} differ"
+        yield f"{self.site}, judged by {self.judge} on {len(self.random)} threats{different}"
         for name, item in (*self.rules.items(), (RANDOM, self.random)):
             yield f"{name}: {_mean(item)}"
         yield f"the best rule of each: {_mean(self.best_of_each)}"
@@ -355,7 +358,17 @@ def judged(
         reductions(flat, None, seeds),
         {name: reductions(env, agent, seeds) for name, agent in agents.items()},
         others,
+        different_threats(flat, seeds),
     )
+
+
+def different_threats(env: BlastBarrierEnv, seeds: Sequence[int]) -> int:
+    """Return how many threats of seeds differ, with their sites."""
+    met = set()
+    for seed in seeds:
+        _, info = env.reset(seed=seed)
+        met.add((info["scenario_hash"], env.observable.sources))
+    return len(met)
 
 
 def main(

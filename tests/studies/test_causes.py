@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.units import PA_PER_PSI
 from studies.causes import Deposit, heaped, repeated, settings
-from studies.first_hour import Judgement, Setting, by_rules
+from studies.first_hour import Judgement, Setting, by_rules, different_threats
 from tests.evaluation.engines.shade import ShadeEngine
 
 FLAT = Setting("courtyard", action="place")
@@ -56,6 +56,14 @@ def test_a_row_of_the_table_has_leads_over_random_and_over_the_best_rule() -> No
         *("25.0 (20.0 to 30.0)", "+25.0"),
         *("30.0", "", ""),
     )
+
+
+def test_threats_that_are_drawn_again_are_told() -> None:
+    one = np.array([0.1, 0.3])
+    found = Judgement("control_room", "gas", {"a": one}, one, {}, charges=1)
+    assert next(found.lines()) == "control_room, judged by gas on 2 threats, of which 1 differ"
+    env = Setting("control_room", engine="surrogate", action="place").environment(ShadeEngine())
+    assert different_threats(env, range(24)) == 3
 
 
 def test_leads_are_on_the_best_rule_of_all_and_of_each() -> None:
