@@ -21,7 +21,7 @@ from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.facade import BayComponents
 from blast_env.site.structures import ground_below_m, is_open_below
 from blast_env.surrogate.approach import Approach, curves
-from blast_env.surrogate.hiding import may_be_hidden
+from blast_env.surrogate.hiding import Gaps
 from blast_env.surrogate.loads import SiteArrays
 from blast_env.surrogate.neighbours import piece_traits
 from blast_env.surrogate.pieces import Box, Memory
@@ -81,7 +81,7 @@ class SurrogateSite:
             )
             for structure in self.protected
         }
-        self._hideable = may_be_hidden(self.protected, scenario)
+        self._gaps = Gaps(self.protected, scenario)
         self._hidden: dict[Layout, list[bool]] = {}
         self._left: dict[frozenset[str], SurrogateSite] = {}
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
@@ -128,11 +128,14 @@ class SurrogateSite:
         No air touches their assessed walls: other structures stand there, or pieces fill the gap
         before these. `None` where nothing can hide any.
         """
-        if not self._hideable:
+        if self._gaps.are_none:
             return None
-        return np.array([self._hidden_by(tuple(sorted(standing(layout)))) for layout in layouts])
+        return np.array([self._hidden_by(layout) for layout in layouts])
 
-    def _hidden_by(self, barrier: Layout) -> list[bool]:
+    def _hidden_by(self, layout: Sequence[Element]) -> list[bool]:
+        if not self._gaps.may_be_filled(self.boxes(layout)):
+            return [False] * len(self.protected)
+        barrier = tuple(sorted(standing(layout)))
         if barrier not in self._hidden:
             from blast_env.gas.engine import structures_without_air
 
