@@ -116,11 +116,14 @@ class _Reading:
         return None
 
     def storeys_m(self, keys: tuple[str, ...], more: tuple[str, ...] = ()) -> float | None:
-        """Return the height of the first readable number of storeys, and of more of them, m."""
-        # Storeys below the roof and in it.
-        counts = [self._storeys(keys), self._storeys(more)]
-        known = [count for count in counts if count is not None]
-        total = sum(known) * self.reader.site_map.options.level_height_m
+        """Return the height of the first readable number of storeys, and of more of them, m.
+
+        It is `None` where only the others are known: storeys in a roof are no height of a building.
+        """
+        count = self._storeys(keys)
+        if count is None:
+            return None
+        total = (count + (self._storeys(more) or 0.0)) * self.reader.site_map.options.level_height_m
         if total > MOST_HEIGHT_M:
             self._unread(next(key for key in (*keys, *more) if key in self.tags), total)
         return total if 0.0 < total <= MOST_HEIGHT_M else None

@@ -253,6 +253,13 @@ def test_storeys_and_undersides(
     assert not site.ledger.of(Fate.GUESSED)
 
 
+def test_storeys_of_a_roof_alone_are_no_height_of_a_building(tmp_path: Path) -> None:
+    """An office with two storeys in its roof had been 6 m high, without a word."""
+    site = of_map(tmp_path, bare(building="office", **{"roof:levels": "2"}))
+    assert heights(site)["features[2]"] == (0.0, 12.0)
+    assert places(site, Fate.GUESSED, "heights not in the file") == ["features[2]"]
+
+
 def test_a_height_below_the_underside_is_the_distance_from_it(tmp_path: Path) -> None:
     site = of_map(tmp_path, beside(height="3", min_height="6"))
     assert heights(site)["features[2]"] == (6.0, 9.0)
