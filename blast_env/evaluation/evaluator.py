@@ -25,7 +25,7 @@ from blast_env.layout.placement import LegalLayout, load_relevant
 from blast_env.provenance import code_version
 from blast_env.response.levels import LevelOfProtection
 from blast_env.runner import ProgressCallback, as_completed, check_workers, share_of
-from blast_env.site import AnyScenario, find_scenario
+from blast_env.site import AnyScenario, Scenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.site.objective import ObjectiveSection
 from blast_env.units import PA_PER_PSI
@@ -479,7 +479,7 @@ class Evaluators:
         self.engine = find_engine(engine)
         self.most = most
         self._store = BlastStore.of(cache)
-        self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
+        self._kept: OrderedDict[tuple[str, str], BlastEvaluator] = OrderedDict()
         self.counts = BlastCounts() if counts is None else counts
 
     def coarser(self) -> "Evaluators | None":
@@ -494,7 +494,8 @@ class Evaluators:
         if newest is not None and newest.scenario is scenario:
             return newest  # the usual case, without the time for a content hash
         found = find_scenario(scenario)
-        key = found.content_hash
+        known = (key for key, own in self._kept.items() if own.scenario is found)
+        key = next(known, None) or self._key(found)
         if key not in self._kept:
             self._kept[key] = BlastEvaluator(
                 found, self.engine, cache=self._store, counts=self.counts
@@ -503,6 +504,10 @@ class Evaluators:
         if len(self._kept) > self.most:
             self._kept.popitem(last=False)
         return self._kept[key]
+
+    def _key(self, scenario: Scenario) -> tuple[str, str]:
+        """Return what a scenario and its records depend on, as those of a `BlastKey`."""
+        return scenario.content_hash, parts_digest(scenario, self.engine.response_s(scenario))
 
 
 @dataclass(frozen=True)

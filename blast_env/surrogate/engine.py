@@ -31,6 +31,14 @@ _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
 
+_SiteKey = tuple[str, tuple[str, ...]]
+
+
+def _key_of(scenario: Scenario) -> _SiteKey:
+    """Return what the loads on a site depend on: the content, and how parts are buildings."""
+    return scenario.content_hash, tuple([own.building_name for own in scenario.structures])
+
+
 def _no_loads(site: SurrogateSite) -> list[StructureLoad]:
     """Return the loads before a prediction: none on structures that are not protected.
 
@@ -110,7 +118,7 @@ class SurrogateEngine(Engine):
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
-    _sites: OrderedDict[str, _SiteLoads] = field(
+    _sites: OrderedDict[_SiteKey, _SiteLoads] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
     )
     _memory: Memory = field(default_factory=Memory, init=False, repr=False, compare=False)
@@ -159,9 +167,12 @@ class SurrogateEngine(Engine):
         """Return the same for several blasts, by one pass of the networks."""
         found: list[BlastLoads | None] = [None] * len(blasts)
         # Layouts of one site pass through the networks together.
-        of_sites: dict[str, list[int]] = {}
+        of_sites: dict[_SiteKey, list[int]] = {}
+        keys: dict[int, _SiteKey] = {}  # by identity: mostly one scenario has all blasts
         for number, blast in enumerate(blasts):
-            of_sites.setdefault(blast.scenario.content_hash, []).append(number)
+            scenario = blast.scenario
+            key = keys.get(id(scenario)) or keys.setdefault(id(scenario), _key_of(scenario))
+            of_sites.setdefault(key, []).append(number)
         # The first site compiles everything; to listen takes longer than a prediction.
         numbers_of_sites = [*of_sites.values()]
         compiled = "the surrogate (some 20 s)"
@@ -189,7 +200,7 @@ class SurrogateEngine(Engine):
         ]
 
     def _site(self, scenario: Scenario) -> _SiteLoads:
-        key = scenario.content_hash
+        key = _key_of(scenario)
         if key not in self._sites:
             self._sites[key] = _SiteLoads(site_of(scenario, self._memory))
             if len(self._sites) > _KEPT_SITES:

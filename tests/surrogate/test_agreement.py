@@ -13,6 +13,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
     BlastLoads,
+    Evaluators,
     LoadCase,
     LoadCaseSet,
     draw_threats,
@@ -127,3 +128,27 @@ def test_a_load_that_is_not_predicted_is_a_dash_and_null(tmp_path: Path) -> None
     ).module_table
     assert len(modules) == 32
     assert modules["impulse_n_s"].isna().all()
+
+
+@pytest.mark.parametrize("engine", ["gas", "surrogate"])
+def test_the_same_walls_are_another_site_as_parts_of_one_building(engine: str) -> None:
+    """Loads of the first had been those of the second: the hash of a site has no buildings."""
+    bare = site("house")
+    weighted = (bare.structures[0], bare.structures[1].model_copy(update={"weight": 3.0}))
+    apart = bare.model_copy(update={"structures": weighted})
+    structures = tuple(own.model_copy(update={"building": "school"}) for own in apart.structures)
+    together = apart.model_copy(update={"structures": structures})
+    used = COARSE if engine == "gas" else SurrogateEngine()
+    evaluators = Evaluators(used)
+    front, house = (
+        load.impulse_pa_s for load in evaluators.of(apart).loads((), LoadCase(CHARGE)).structures
+    )
+    first, second = (
+        evaluators.of(scenario).loads((), LoadCase(CHARGE)).protected_impulse_pa_s
+        for scenario in (apart, together)
+    )
+    assert first == pytest.approx(front + 3.0 * house)
+    assert second == pytest.approx(2.0 * (front + house))
+    own = used.loads(together, (), CHARGE, 0)
+    assert [load.building for load in own.structures] == ["school", "school"]
+    assert second == own.protected_impulse_pa_s
