@@ -239,7 +239,7 @@ def _entries(
             continue
         given = [*methods.entries([name], asked, sites)]
         found += [_Entry(*entry, methods.source_digest(name)) for entry in given]
-    found += [_trained(run, asked or BUDGETS[:2]) for run in runs]
+    found += [_trained(run, asked or BUDGETS[:2], definitions) for run in runs]
     return [*{(entry.name, entry.identity): entry for entry in found}.values()]
 
 
@@ -256,15 +256,21 @@ def _with_guesses(name: str, asked: Sequence[int]) -> _Entry:
     return _Entry(own, method_of(search), budgets_of(name, asked), " ".join(digests.values()))
 
 
-def _trained(run: Path, budgets: Sequence[int]) -> _Entry:
-    """Return the agent of a run folder."""
+def _trained(run: Path, budgets: Sequence[int], definitions: Mapping[str, Definition]) -> _Entry:
+    """Return the agent of a run folder; say if it has learnt against other threats."""
     from blast_env.benchmark.methods import method_of
 
     with import_extra("agents", "trained agents"):
         from blast_agents.training import load_agent
+        from blast_agents.training.run_folder import RunFolder
 
         from blast_env.design.search.learnt import SurrogateSearch
     agent = load_agent(run)
+    learnt = RunFolder(run).configuration().settings.threat
+    known = [definition.case.charge is not None for definition in definitions.values()]
+    if (learnt == "hidden" and any(known)) or (learnt == "visible" and not all(known)):
+        shown = "where the charge is hidden" if learnt == "hidden" else "known charges"
+        print_line(f"{run}: it has learnt {shown}, and is judged on problems of the other kind")
     search = SurrogateSearch(agent=agent)
     return _Entry(f"agent {run.resolve().name}", method_of(search), budgets, agent.digest)
 

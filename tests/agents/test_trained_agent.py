@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
+from typing import Any
 
 import numpy as np
 import pytest
@@ -140,8 +141,21 @@ def test_samples_differ_and_follow_from_their_seed(run: Path) -> None:
     assert layouts != agent.sample(small_scenario(), CHARGES[0], count=6, seed=2)
     for layout in layouts:
         assert LayoutState.of(small_scenario(), layout).cells == layout
-    with pytest.raises(BlastEnvError, match="count is 0"):
-        agent.sample(small_scenario(), count=0)
+    for wrong, said in ({"count": 0}, "count is 0"), ({"count": 2.5}, "count is 2.5"):
+        with pytest.raises(BlastEnvError, match=said):
+            agent.sample(small_scenario(), **wrong)
+    with pytest.raises(BlastEnvError, match="seed is -1"):
+        agent.sample(small_scenario(), seed=-1)
+
+
+def test_names_of_weights_and_algorithms_are_checked(run: Path) -> None:
+    """Any other name had meant the last weights, or MaskablePPO."""
+    wrong: Any = "Best"
+    with pytest.raises(BlastEnvError, match="no weights 'Best', did you mean 'best'"):
+        load_agent(run, wrong)
+    wrong = "PPO"
+    with pytest.raises(BlastEnvError, match="no algorithm 'PPO'"):
+        load_archive(run / "best_model.zip", wrong, small_scenario(), trust_archive=True)
 
 
 def test_the_charge_is_seen_when_it_is_told() -> None:

@@ -67,6 +67,21 @@ def test_an_agent_of_visible_charges_gets_each_charge_as_a_problem(
         assert played.blasts == 0
 
 
+@pytest.mark.parametrize(("learnt", "judged"), [("hidden", "visible"), ("visible", "hidden")])
+def test_an_agent_of_other_threats_is_judged_with_a_word_on_it(
+    tmp_path: Path, learnt: str, judged: str
+) -> None:
+    site = scenario_file(tmp_path)
+    train(settings(site, steps=16, threat=learnt), hyperparameters(), tmp_path / "run")
+    options = ("--run", tmp_path / "run", "--scenario", site, "--budget", 0, "--cell", 0.5)
+    told = {}
+    for threat in (learnt, judged):
+        result = run("judge", *options, "--cases", 1, "--threat", threat)
+        assert result.exit_code == 0, result.output
+        told[threat] = "is judged on problems of the other kind" in " ".join(result.stdout.split())
+    assert told == {learnt: False, judged: True}
+
+
 def test_generated_sites_are_held_out_from_training(tmp_path: Path) -> None:
     """A budget that is given twice counts once."""
     found = judged_agent(tmp_path, Path("sites"), "--cases", 2, "--budget", 0)

@@ -22,8 +22,9 @@ from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticP
 from stable_baselines3.common.preprocessing import is_image_space
 from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage
 
+from blast_agents.packaged import MOST_DRAWS
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy, ZonePolicy
-from blast_agents.training.hyperparameters import schedule
+from blast_agents.training.hyperparameters import ALGORITHMS, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_agents.training.weights import load_policy, read_parameters
 from blast_env.envs.arguments import check_names
@@ -36,6 +37,7 @@ from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.sources import source_of
+from blast_env.values import checked_seed, whole_number
 
 Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
@@ -231,12 +233,12 @@ class PolicyAgent:
             seed: Seed of the samples.
 
         Raises:
-            BlastEnvError: As for `propose`, or if `count` is below 1.
+            BlastEnvError: As for `propose`, or if `count` is not a whole number from 1 to 10,000,
+                or the seed none from 0 on.
         """
-        if count < 1:
-            raise BlastEnvError(f"count is {count}, must be at least 1")
-        generator = torch.Generator().manual_seed(seed)
-        return self._layouts(find_scenario(scenario), charge, generator, count)
+        checked = whole_number("count", count, 1, MOST_DRAWS)
+        generator = torch.Generator().manual_seed(checked_seed(seed))
+        return self._layouts(find_scenario(scenario), charge, generator, checked)
 
     def _layouts(
         self, scenario: Scenario, charge: AnyCharge | None, draw: torch.Generator | None, count: int
@@ -298,8 +300,10 @@ def weights_of(run: str | Path, weights: Literal["best", "last"] = "best") -> Pa
     """Return the archive of the best or the last weights of a run folder.
 
     Raises:
+        UnknownNameError: If `weights` is neither `"best"` nor `"last"`.
         BlastEnvError: If it is not a run folder, or has no such weights yet.
     """
+    check_names("weights", [weights], ("best", "last"))
     folder = RunFolder(Path(run))
     folder.configuration()
     checkpoints = [*folder.checkpoints.values()]
@@ -362,9 +366,11 @@ def load_archive(
         observation: Name of the observation that the policy is for.
 
     Raises:
+        UnknownNameError: If the algorithm is unknown; the message has the nearest one.
         BlastEnvError: If the archive is not trusted, cannot be read, or is for observations or
             actions other than those of the scenario.
     """
+    check_names("algorithm", [algorithm], ALGORITHMS)
     if not trust_archive:
         raise BlastEnvError(f"{path}: {_ARCHIVES_HOLD_CODE}; trust_archive is False, must be True")
     model = PPO if algorithm == "ppo" else MaskablePPO
