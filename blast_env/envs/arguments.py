@@ -79,12 +79,14 @@ def strategy(
 
     Raises:
         UnknownNameError: If there is none of that name; the message has the nearest one.
-        BlastEnvError: If an object lacks the methods that the known ones have in common, or is of
-            none of the protocols.
+        BlastEnvError: If it is a class, or an object that lacks the methods that the known ones
+            have in common, or is of none of the protocols.
     """
     if isinstance(value, str):
         check_names(kind, [value], known)
         return known[value]
+    if isinstance(value, type):
+        raise BlastEnvError(f"{kind} is the class {value.__name__}, must be an object of it")
     missing = [name for name in _common_methods(known.values()) if not hasattr(value, name)]
     if missing:
         names = ", ".join(map(repr, sorted(known)))

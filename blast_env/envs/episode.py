@@ -209,7 +209,7 @@ class _Site:
         found = self.shown.get(charges)
         if found is not None:
             return found
-        sources = task.threat_model.shown(self.empty.scenario, charges)
+        sources = tuple(task.threat_model.shown(self.empty.scenario, charges))
         among = bool(task.source.representative.vehicles)
         observable = Observable(self.empty.scenario, sources, among, self.observed)
         observation = task.observation.episode(observable)
@@ -460,7 +460,7 @@ class Episodes:
         # 1. Site, charges, seeds: always in this order, and as many numbers, whatever is fixed
         # afterwards.
         site = self.site_of(task.source.sample(rng))
-        charges = task.threat_model.draw(site.empty.scenario, rng)
+        charges = tuple(task.threat_model.draw(site.empty.scenario, rng))
         seeds = SeedRange.TRAINING.draw(rng, (len(charges), task.realisations))
         # 2. What is fixed takes the place of what was drawn.
         if options.blast_seed is not None:
@@ -649,7 +649,7 @@ class Episodes:
         """Return the rewards of the last actions (episodes,); episodes have their terms.
 
         Raises:
-            BlastEnvError: If the terms differ from those that the reward names.
+            BlastEnvError: If the terms differ from those that the reward names, or their number.
         """
         chosen, rows = np.asarray(indices), self._rows(indices)
         self.terms[rows] = 0.0
@@ -674,7 +674,14 @@ class Episodes:
         if self._at_ends is not None:
             ended, reductions = self.ended[chosen], np.zeros(len(chosen))
             reductions[ended] = [self.running[index].reduction for index in chosen[ended].tolist()]
-            return self._at_ends.paid(self._turns_made[chosen] == 1, ended, reductions)
+            all_paid = self._at_ends.paid(self._turns_made[chosen] == 1, ended, reductions)
+            wanted = len(chosen), len(self.term_names) - 1
+            if np.shape(all_paid) != wanted:  # which NumPy may fit, and so pay one number twice
+                raise BlastEnvError(
+                    f"the reward pays an array of shape {np.shape(all_paid)}, must be {wanted}:"
+                    " (turns, terms)"
+                )
+            return all_paid
         assert self._of_turns is not None
         paid = np.empty((len(chosen), len(self.term_names) - 1))
         for terms, index in zip(paid, chosen.tolist(), strict=True):

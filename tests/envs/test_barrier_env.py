@@ -226,6 +226,39 @@ def test_a_reward_of_ones_own_may_be_of_many_turns_at_once() -> None:
     assert steps[-1][4]["reward_terms"] == terms
 
 
+class PaysOneNumber(PayAtTheEnd):
+    """A reward that names two terms and pays one number a turn, which both would get."""
+
+    def paid(self, begins: np.ndarray, ended: np.ndarray, reductions: FloatArray) -> FloatArray:
+        return reductions
+
+
+def test_a_reward_pays_as_many_numbers_as_it_has_terms() -> None:
+    env = make(reward=PaysOneNumber())
+    env.reset(seed=1)
+    with pytest.raises(BlastEnvError, match=r"of shape \(1,\), must be \(1, 2\): \(turns, terms\)"):
+        env.step(0)
+
+
+def test_a_class_is_no_reward() -> None:
+    with pytest.raises(BlastEnvError, match="reward is the class PayAtTheEnd, must be an object"):
+        make(reward=PayAtTheEnd)
+
+
+class AnyCharges:
+    """Threats of a user's, in lists."""
+
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> list[Any]:
+        return [scenario.sample_charge(rng)]
+
+    def shown(self, scenario: Scenario, charges: Any) -> list[Any]:
+        return [*scenario.charge]
+
+
+def test_threats_of_ones_own_may_be_lists() -> None:
+    assert len(play(make(threat=AnyCharges()), seed=1)[-1][4]["charges"]) == 1
+
+
 class NamesOnly:
     """No reward: it names its terms and pays nothing."""
 
