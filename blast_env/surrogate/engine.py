@@ -163,6 +163,32 @@ class SurrogateEngine(Engine):
         names = ", ".join(others[:_NAMED]) + ", ..." * (len(others) > _NAMED)
         return no_blasts, f"{names}: not protected, so not predicted"
 
+    def doubts(
+        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge
+    ) -> tuple[str, ...]:
+        """Return the 95 % intervals of the loads without a barrier and with a layout.
+
+        A surrogate that was not checked on held-out sites has none.
+        """
+        site, fit = self._site(scenario).site, self.surrogate.fit
+        if fit.impulse is None or (site.counts_peaks and fit.peak is None):
+            return ("the surrogate has no intervals: its errors are not known",)
+        layouts = [(), layout]
+        charges = [charge_against(scenario, own, charge) for own in layouts]
+        guess = self.surrogate.guess(site, layouts, charges)
+        low, high = (
+            ends.loads(site, layouts).tolist()
+            for ends in (self.surrogate.lower_ends(guess), self.surrogate.upper_ends(guess))
+        )
+        text = scenario.objective.text
+        without, behind = (
+            f"{text(one)} to {text(other)}" for one, other in zip(low, high, strict=True)
+        )
+        return (
+            f"95 % intervals of the predictions under the worst threat: {without} without barrier, "
+            f"{behind} with",
+        )
+
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks."""
         found: list[BlastLoads | None] = [None] * len(blasts)

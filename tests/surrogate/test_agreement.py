@@ -22,7 +22,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.site import Scenario, save_scenario
+from blast_env.site import Charge, Scenario, save_scenario
 from blast_env.surrogate import SurrogateEngine, packaged_surrogate, site_of
 from tests.catalogue_sites import WALL, yard_document
 from tests.cli.running import run
@@ -152,3 +152,23 @@ def test_the_same_walls_are_another_site_as_parts_of_one_building(engine: str) -
     own = used.loads(together, (), CHARGE, 0)
     assert [load.building for load in own.structures] == ["school", "school"]
     assert second == own.protected_impulse_pa_s
+
+
+def test_an_evaluation_by_guesses_says_how_sure_they_are() -> None:
+    """Intervals had been dropped, also far outside the fit, where they are wide."""
+    scenario, surrogate = site("other"), packaged_surrogate()
+    layout = WALLS[:1]
+    found = evaluate_layout(scenario, layout, threats=[LoadCase(CHARGE)], engine=SURROGATE)
+    (said,) = (note for note in found.notes if note.startswith("95 % intervals"))
+    guess = surrogate.guess(site_of(scenario), [layout], [CHARGE])
+    ends = surrogate.lower_ends(guess), surrogate.upper_ends(guess)
+    low, high = (f"{end.impulse_pa_s.item():,.0f} Pa s" for end in ends)
+    assert said.endswith(f"without barrier, {low} to {high} with")
+    above = Charge((7.0, 4.0), 0.1, 6.0)
+    rough = evaluate_layout(scenario, (), threats=[LoadCase(above)], engine=SURROGATE)
+    assert any(note.startswith("95 % intervals") for note in rough.notes)
+    unchecked = replace(surrogate, fit=surrogate.fit.model_copy(update={"impulse": None}))
+    bare = evaluate_layout(
+        scenario, (), threats=[LoadCase(CHARGE)], engine=SurrogateEngine(unchecked)
+    )
+    assert "the surrogate has no intervals: its errors are not known" in bare.notes

@@ -207,6 +207,15 @@ class Engine(ABC):
         """Return the warnings with every result on a site, one sentence each."""
         return ()
 
+    def doubts(
+        self,
+        scenario: Scenario,  # noqa: ARG002
+        layout: Sequence[Element],  # noqa: ARG002
+        charge: AnyCharge,  # noqa: ARG002
+    ) -> Sequence[str]:
+        """Return the errors of its own of the loads of one charge and layout, in sentences."""
+        return ()
+
     @property
     def words(self) -> str:
         """The engine's name and the settings that affect its results, for display."""

@@ -543,7 +543,11 @@ class Evaluation:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
-        notes = [*self.engine.caveats(self.scenario)]
+        charge = self.worst.threat.charge
+        notes = [
+            *self.engine.caveats(self.scenario),
+            *self.engine.doubts(self.scenario, self.layout, charge),
+        ]
         if self.scenario.objective.is_response:
             notes += (
                 f"{name}: protected, but without a facade: its response counts as 0"
