@@ -469,6 +469,26 @@ def test_a_map_becomes_a_site_with_its_deviations_told(
     play(tmp_path, story)
 
 
+def test_the_build_zone_of_a_map_is_kept_where_no_other_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "Reading", ReadHere)
+
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        await replace_site(user, BLOCK)
+        await user.should_see("protected buildings (names, separated by commas)")
+        user.find("protected buildings (names, separated by commas)").type("Town Hall")
+        field_of(user, "build zone around the protected buildings (m)").value = ""
+        user.find(marker="import").click()
+        await user.should_see(marker="take-site", retries=200)
+        user.find(marker="take-site").click()
+        zone = session.scenario.zone
+        assert (zone.rows, zone.columns) == (8, 64)  # of 32 m x 4 m on the map
+
+    play(tmp_path, story)
+
+
 def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,6 +24,7 @@ from blast_env.values import plain_number
 
 Read = TypeVar("Read")
 _MOST_LETTERS: Final = 100
+_AROUND: Final = "build zone around the protected buildings (m)"
 
 
 def complain(error: BlastEnvError) -> None:
@@ -160,7 +161,8 @@ class ImportDialog:
                 self._near = _text("or the building nearest to x, y of the file")
                 self._charges = _text("charges at x, y; x, y of the file (or its streets)")
                 self._tnt = _number("mass of a charge (kg TNT)", 100.0)
-                self._around = _number("build zone around the protected buildings (m)", 10.0)
+                self._around = _number(_AROUND, 10.0, optional=True)
+                self._around.tooltip("empty for the build zone of the file, if it has one")
                 self._stock = _number("stock of modules", 20.0, whole=True)
                 self._wall = _number("height of modules (m)", 3.0)
                 self._height = _number("height of buildings without one (m)", None, optional=True)
@@ -184,7 +186,7 @@ class ImportDialog:
             protect_near=next(iter(_places(_filled(self._near))), None),
             charge_at=tuple(_places(_filled(self._charges))),
             tnt_kg=self._tnt.filled,
-            zone_around_m=self._around.filled,
+            zone_around_m=self._around.number,
             stock=int(self._stock.filled),
             wall_height_m=self._wall.filled,
             default_height_m=self._height.number,
