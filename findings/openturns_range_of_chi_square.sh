@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The sum of squares of ten gauge errors, in units of their deviation, has the chi-square
-# distribution of ten degrees of freedom, with the mean 10. One would guess that OpenTURNS, which has
+# distribution of ten degrees of freedom, with a mean of 10. One would guess that OpenTURNS, having
 # its density and its distribution function right, has right what it makes of them. It takes the
 # distribution to end at 6 (at 60 over the degrees of freedom; as Gamma, which is the same, it ends
 # at 88.6), and whatever is integrated numerically stops there: the mean square (`getMoment(2)`) is
