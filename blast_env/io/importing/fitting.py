@@ -213,7 +213,9 @@ def _fitted(
         carries=thing.carries,
         part_of=thing.part_of,
         deviation=off,
-        is_cut=bool(shapely.intersects(thing.geometry, site.box.boundary)),
+        is_cut=any(
+            entry.kind == _CUT and entry.place == thing.place for entry in site.ledger.of(Fate.CUT)
+        ),
         facade=fitted(thing.facade, walls_m, rise_m, thing.place, site.ledger),
     )
 

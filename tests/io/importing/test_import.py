@@ -490,12 +490,21 @@ def test_a_building_that_the_border_cuts_apart_has_two_structures(tmp_path: Path
     options = {"origin": (-8.0, 4.0), "size_m": (26.0, 12.0), "rotation_deg": 0.0}
     site = imported(path, charge_at=((-5.0, 10.0),), **options)
     assert [entry.detail for entry in site.ledger.of(Fate.CUT)] == ["32.0 of 76.0 m2"]
+    assert [building.is_cut for building in site.buildings] == [True]
     scenario = site.scenario
     assert [structure.name for structure in scenario.structures] == ["Ua", "Ub"] or [
         structure.name for structure in scenario.structures
     ] == ["U_a", "U_b"]
     assert {structure.building for structure in scenario.structures} == {"U"}
     assert sum(structure.weight for structure in scenario.structures) == pytest.approx(1.0)
+
+
+def test_a_building_that_ends_at_the_border_is_not_cut(tmp_path: Path) -> None:
+    site = outline(rectangle(0, 0, 40, 30), kind="site")
+    house = outline(rectangle(0, 0, 12, 8), name="House")
+    imported_site = imported(written(tmp_path, site, house, charge(30, 20)), protect=("House",))
+    assert [building.is_cut for building in imported_site.buildings] == [False]
+    assert not imported_site.ledger.of(Fate.CUT)
 
 
 def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
