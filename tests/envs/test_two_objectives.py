@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from mo_gymnasium.utils import make as mo_gymnasium_make
+from mo_gymnasium.wrappers.vector.wrappers import MOSyncVectorEnv
 from mo_gymnasium.wrappers.wrappers import LinearReward
 
 from blast_env.errors import BlastEnvError
@@ -45,6 +46,13 @@ def test_weights_make_one_score_of_both() -> None:
     _, first, *_ = env.step(160)  # a module of 16
     _, last, *_, info = env.step(640)
     assert float(first) + float(last) == pytest.approx(info["reduction"] - 0.5 / 16, abs=1e-6)
+
+
+def test_vectors_of_mo_gymnasium_have_both_rewards_of_each() -> None:
+    envs = MOSyncVectorEnv(iter([lambda: make("courtyard")] * 2))
+    envs.reset(seed=1)
+    _, rewards, *_ = envs.step(np.array([160, 640]))
+    assert np.asarray(rewards) == pytest.approx(np.array([[0.0, -1.0 / 16], [0.0, 0.0]]))
 
 
 def test_a_reward_of_ones_own_is_refused() -> None:
