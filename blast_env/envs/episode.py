@@ -642,7 +642,8 @@ class Episodes:
             own = [next(loads) for _ in episode.case.threats]
             episode.loads[layout] = Assessment.of(episode.case, layout, own)
             if not layout:
-                _check_bare(episode, own[0].without_load)
+                if not episode.loads[()].load > 0.0:
+                    _check_bare(episode, own[0].without_load)
                 _keep(episode.site.bare, episode.loads_key, episode.loads[()])
 
     def rewards(self, indices: Sequence[int]) -> FloatArray:
