@@ -29,7 +29,7 @@ def bay_damages(
     under the histories and under sharper ones of the same impulse.
 
     Args:
-        time_s: Times of the histories, ascending (times,).
+        time_s: Times of the histories, ascending: (times,), or (bays, times) if they differ.
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
         peak_factor: Factor on peaks to make them as sharp as in the open; 1 without clipping.
     """
@@ -41,7 +41,8 @@ def bay_damages(
         for name, filled in (*bay.glazing.items(), *bay.wall.items())
     ]
     filled, of_bay = [place for *_, place in places], [index for index, *_ in places]
-    damage = _numbers(respond(filled, time_s, pressure_pa[of_bay]))
+    own_s = time_s if time_s.ndim == 1 else time_s[of_bay]
+    damage = _numbers(respond(filled, own_s, pressure_pa[of_bay]))
     if peak_factor > 1.0:
         times_s, sharper_pa = peak_corrected(time_s, pressure_pa, peak_factor)
         damage = np.maximum(damage, _numbers(respond(filled, times_s, sharper_pa[of_bay])))
@@ -63,7 +64,7 @@ def _numbers(found: FacadeResponse) -> FloatArray:
 
 
 class TriangularLoads:
-    """Bays under a common triangular load: a rough estimate without histories.
+    """Bays under triangular loads: a rough estimate without histories.
 
     Args:
         bays: The bays.
@@ -71,28 +72,57 @@ class TriangularLoads:
 
     def __init__(self, bays: Sequence[Alternatives]) -> None:
         self._bays = [(_kind(bay), bay, _areas(bay)) for bay in bays]
-        self._alike = {kind: bay for kind, bay, _ in reversed(self._bays)}
+        self._found: dict[tuple[_Kind, float, float], dict[str, float]] = {}
 
-    def damages(self, peak_pa: float, impulse_pa_s: float) -> tuple[BayDamage, ...]:
+    def damages(
+        self,
+        peak_pa: float | FloatArray,
+        impulse_pa_s: float | FloatArray,
+        peak_factor: float = 1.0,
+    ) -> tuple[BayDamage, ...]:
         """Return the damage of the bays.
 
         Args:
-            peak_pa: Peak, reached at once, from which the pressure falls linearly to 0.
-            impulse_pa_s: Impulse, which determines the duration.
+            peak_pa: Peaks, reached at once, from which the pressure falls linearly to 0: of all
+                bays (bays,), or a common one.
+            impulse_pa_s: Impulses, which determine the durations, likewise.
+            peak_factor: As for `bay_damages`.
         """
-        if not self._bays:
-            return ()
-        # Bays that are alike respond alike under one load: each kind once. The triangle of a peak
-        # and an impulse lasts 2 i / p.
-        end_s = 2.0 * impulse_pa_s / peak_pa if peak_pa > 0.0 else 1e-3
-        time_s = np.array([0.0, end_s, 2.0 * end_s])
-        pressure_pa = np.tile([peak_pa, 0.0, 0.0], (len(self._alike), 1))
-        damages = bay_damages([*self._alike.values()], time_s, pressure_pa)
-        found = dict(zip(self._alike, damages, strict=True))
+        loads = (np.broadcast_to(own, len(self._bays)) for own in (peak_pa, impulse_pa_s))
+        peaks_pa, impulses_pa_s = (own.tolist() for own in loads)
+        damages = self._under(peaks_pa, impulses_pa_s)
+        if peak_factor > 1.0:
+            sharper = self._under([peak_factor * own for own in peaks_pa], impulses_pa_s)
+            damages = [
+                {name: max(value, other[name]) for name, value in own.items()}
+                for own, other in zip(damages, sharper, strict=True)
+            ]
         return tuple(
-            BayDamage(bay.name, bay.structure, *areas, found[kind].damage)
-            for kind, bay, areas in self._bays
+            BayDamage(bay.name, bay.structure, *areas, damage)
+            for (_, bay, areas), damage in zip(self._bays, damages, strict=True)
         )
+
+    def _under(
+        self, peaks_pa: Sequence[float], impulses_pa_s: Sequence[float]
+    ) -> list[dict[str, float]]:
+        """Return the damage of the components of each bay under its load."""
+        # Bays that are alike respond alike under one load: each kind and load once.
+        asked = [
+            (kind, peak_pa, impulse_pa_s)
+            for (kind, *_), peak_pa, impulse_pa_s in zip(
+                self._bays, peaks_pa, impulses_pa_s, strict=True
+            )
+        ]
+        new = {
+            key: bay
+            for key, (_, bay, _) in zip(asked, self._bays, strict=True)
+            if key not in self._found
+        }
+        if new:
+            loads = np.array([key[1:] for key in new])
+            made = bay_damages([*new.values()], *triangle(loads[:, 0], loads[:, 1]))
+            self._found.update({key: own.damage for key, own in zip(new, made, strict=True)})
+        return [self._found[key] for key in asked]
 
 
 _STATIC_S: Final = 0.5
@@ -129,8 +159,11 @@ def damage_numbers(found: GlazingResponses | PanelResponses) -> FloatArray:
     return found.damage if isinstance(found, PanelResponses) else found.hazard
 
 
-def _kind(bay: Alternatives) -> tuple[object, ...]:
-    """Return the properties that determine a bay's response, besides the load."""
+_Kind = tuple[object, ...]
+"""The properties that determine a bay's response, besides the load."""
+
+
+def _kind(bay: Alternatives) -> _Kind:
     height_m = next(iter((*bay.glazing.values(), *bay.wall.values()))).bay.height_m
     return round(height_m, 6), *bay.glazing, None, *bay.wall
 

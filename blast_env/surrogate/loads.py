@@ -279,7 +279,7 @@ def put_charges(
     found: FloatArray,
     farthest_m: FloatArray,
 ) -> None:
-    """Put the logarithms of the loads of layouts against charges (members, layouts, structures).
+    """Put the logarithms of the loads of layouts against charges (members, layouts, parts).
 
     Args:
         asked: The charges and the layouts.
@@ -599,12 +599,12 @@ def _put_weights(
 
 @njit(error_model="numpy")
 def _areas_m2(starts: Any, area_m2: FloatArray) -> FloatArray:
-    """Return the area of the points of each structure."""
+    """Return the area of the points of each part."""
     areas_m2 = np.zeros(len(starts))
-    for structure in range(len(starts)):
-        after = starts[structure + 1] if structure + 1 < len(starts) else len(area_m2)
-        for point in range(starts[structure], after):
-            areas_m2[structure] += area_m2[point]
+    for part in range(len(starts)):
+        after = starts[part + 1] if part + 1 < len(starts) else len(area_m2)
+        for point in range(starts[part], after):
+            areas_m2[part] += area_m2[point]
     return areas_m2
 
 
@@ -672,13 +672,13 @@ def put_loads(
     first_layout: int,
     found: Any,
 ) -> None:
-    """Put the logarithms of the loads of layouts against a charge (members, layouts, structures).
+    """Put the logarithms of the loads of layouts against a charge (members, layouts, parts).
 
     `first_layout` is where the first of them is in `found`. Pieces are numbered from 1 if they are
     kept, and from -1 down if they are new; 0 ends a layout.
     """
     own_frame()
-    starts, area_m2 = site.points.starts, site.points.area_m2
+    starts, area_m2 = site.points.parts, site.points.area_m2
     members, rows, width = base.shape
     points, given, length = len(area_m2), bench.given, new.messages.shape[3]
     at, to, beside = place(given), place(bench.between), place(bench.beyond)
@@ -701,7 +701,7 @@ def put_loads(
             to_last = place(layers.last[member])
             power, known = layers.powers[member], charge.logs[layers.kinds[member]]
             loads[:] = 0.0
-            structure = 0
+            owner = 0
             for row in range(0, rows, ROWS_AT_ONCE):
                 # 1. What the pieces say, weighted and added up.
                 if not is_bare:
@@ -719,14 +719,14 @@ def put_loads(
                     for part in range(PARTS):
                         differs += bench.parts[number, part]
                     point = row + number
-                    while structure + 1 < len(starts) and point >= starts[structure + 1]:
-                        structure += 1
+                    while owner + 1 < len(starts) and point >= starts[owner + 1]:
+                        owner += 1
                     over = min(max(differs + layers.last_bias[member], LEAST_OVER), MOST_OVER)
                     of_point = known[point] + over
-                    loads[structure] += area_m2[point] * exp(power * of_point)
-            for structure in range(len(starts)):
-                of_structure = log(loads[structure] / areas_m2[structure]) / power
-                found[member, first_layout + layout, structure] = of_structure
+                    loads[owner] += area_m2[point] * exp(power * of_point)
+            for owner in range(len(starts)):
+                of_owner = log(loads[owner] / areas_m2[owner]) / power
+                found[member, first_layout + layout, owner] = of_owner
 
 
 def mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:

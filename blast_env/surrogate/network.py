@@ -5,7 +5,7 @@ weighted, number by number, by how a piece stands to the others. The prediction 
 function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import sha256
@@ -22,7 +22,9 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
+from blast_env.gas.settings import GasSettings
 from blast_env.geometry import Element
+from blast_env.response.facade import peak_factor
 from blast_env.response.levels import BayDamage
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import FEATURES, INPUTS
@@ -51,6 +53,9 @@ Asked = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
 
 _FEW: Final = 4
 """Most layouts against a charge for which nothing of their pieces is kept when it is met first."""
+
+_CELL_M: Final = GasSettings().cell_m
+"""Side of the cells of the blasts that it is fitted to."""
 
 HIDDEN: Final = 64
 """Width of the two hidden layers."""
@@ -145,20 +150,26 @@ class Guess(NamedTuple):
         peak_pa: Largest overpressure on each protected structure, NaN as of the impulse (layouts,
             structures); `None` if the objective counts no peaks.
         peak_spread: Standard deviation of its logarithm among the members (layouts, structures).
+        on_bays: The same of the bays of all structures, the loads by which facades respond, in the
+            order of `SurrogateSite.alternatives`; `None` if the response does not count.
+        peak_factors: What makes these peaks as sharp as in the open, against the charge of each
+            layout (layouts,); see `response.facade.peak_factor`.
     """
 
     impulse_pa_s: FloatArray
     spread: FloatArray
     peak_pa: FloatArray | None = None
     peak_spread: FloatArray | None = None
+    on_bays: "Guess | None" = None
+    peak_factors: FloatArray | None = None
 
     def loads(self, site: SurrogateSite, layouts: Sequence[Sequence[Element]] = ()) -> FloatArray:
         """Return the load of each layout, in the objective's unit (layouts,).
 
         That of a building is the mean over the area of its parts. It is NaN if a building has no
-        load. If the objective counts the response of facades, each bay of a structure has a
-        triangular load with the predicted impulse and peak of the structure. The peak is the
-        largest one on the structure, so that the response is conservative.
+        load. If the objective counts the response of facades, each bay has a triangular load with
+        its own predicted impulse and peak, or a sharper one, as by gas dynamics. The peak is the
+        largest one on the bay, not that of the mean over it.
 
         Args:
             site: The site of the prediction.
@@ -189,35 +200,55 @@ class Guess(NamedTuple):
 
     def bays(self, site: SurrogateSite, index: int) -> tuple[BayDamage, ...]:
         """Return the damage of the bays behind a layout, by its index, under triangular loads."""
-        assert self.peak_pa is not None
+        loads = self._bay_loads(index)
         found: list[BayDamage] = []
-        for column, structure in enumerate(site.protected):
-            peak_pa, impulse_pa_s = self.peak_pa[index, column], self.impulse_pa_s[index, column]
-            if not np.isnan(impulse_pa_s):
-                found += site.bay_damages(structure.name, float(peak_pa), float(impulse_pa_s))
+        for structure, on_it_pa_s in zip(site.protected, self.impulse_pa_s[index], strict=True):
+            if not isnan(on_it_pa_s):
+                found += site.bay_damages(structure.name, *loads)
         return tuple(found)
 
     def _response(self, site: SurrogateSite, index: int, layout: Sequence[Element]) -> float:
         assert self.peak_pa is not None
-        loads = zip(self.peak_pa[index].tolist(), self.impulse_pa_s[index].tolist(), strict=True)
+        loads = self._bay_loads(index)
         # A building without a load has no response. A part of another one counts as 0.
         of_buildings, _ = site.of_buildings(self.impulse_pa_s[index : index + 1], self.peak_pa[:1])
         if np.isnan(of_buildings).any():
             return nan
         return sum(
-            structure.weight * site.response(structure.name, layout, *load)
-            for structure, load in zip(site.protected, loads, strict=True)
-            if not isnan(load[1])
+            structure.weight * site.response(structure.name, layout, *loads)
+            for structure, on_it_pa_s in zip(site.protected, self.impulse_pa_s[index], strict=True)
+            if not isnan(on_it_pa_s)
         )
 
+    def _bay_loads(self, index: int) -> tuple[FloatArray, FloatArray, float]:
+        """Return peaks, Pa, and impulses, Pa s, on bays (bays,), and the factor on the peaks."""
+        assert self.on_bays is not None
+        assert self.on_bays.peak_pa is not None
+        assert self.peak_factors is not None
+        factor = float(self.peak_factors[index])
+        return self.on_bays.peak_pa[index], self.on_bays.impulse_pa_s[index], factor
 
-def _in_order(numbers: Sequence[Sequence[int]], made: Iterator[Guess]) -> Guess:
-    """Return the guess of all layouts of a site from the next ones of parts, by their numbers."""
-    order = np.argsort(np.concatenate(numbers))
-    fields: list[Any] = [*zip(*(next(made) for _ in numbers), strict=True)]
-    for number, own in enumerate(fields):
-        fields[number] = None if own[0] is None else np.concatenate(own)[order]
-    return Guess(*fields)
+
+def _guess_of(loads: Sequence[FloatArray], columns: slice) -> Guess:
+    """Return some columns of impulses, their spreads and, if there are any, the same of peaks."""
+    impulse_pa_s, spread, *of_peaks = (own[:, columns] for own in loads)
+    if not of_peaks:
+        return Guess(impulse_pa_s, spread)
+    peak_pa, peak_spread = of_peaks
+    return Guess(impulse_pa_s, spread, peak_pa, peak_spread)
+
+
+def _joined(made: Sequence[Guess], order: IntArray) -> Guess:
+    """Return the guess of all layouts of several guesses, in another order."""
+
+    def whole(parts: Sequence[Any]) -> Any:
+        if parts[0] is None:
+            return None
+        return (
+            _joined(parts, order) if isinstance(parts[0], Guess) else np.concatenate(parts)[order]
+        )
+
+    return Guess(*(whole(parts) for parts in zip(*made, strict=True)))
 
 
 class Member(NamedTuple):
@@ -399,7 +430,11 @@ class Surrogate:
             for left, own in of_site
         ]
         made = iter(self._guesses(of_parts))
-        return [_in_order([own for _, own in of_site], made) for of_site in parts]
+        orders = [np.argsort(np.concatenate([own for _, own in of_site])) for of_site in parts]
+        return [
+            _joined([next(made) for _ in of_site], order)
+            for of_site, order in zip(parts, orders, strict=True)
+        ]
 
     def _guesses(self, asked: Sequence[Asked]) -> list[Guess]:
         """Return the same for layouts that take no structure away."""
@@ -409,17 +444,22 @@ class Surrogate:
         # fitted from different beginnings (deep ensembles, Lakshminarayanan et al. 2017).
         both = [mean_and_spread(np.concatenate(logs, axis=1)) if logs else () for logs in found]
         guesses, firsts = [], [0, 0]
-        for (site, layouts, _), place in zip(asked, places, strict=True):
+        for (site, layouts, charges), place in zip(asked, places, strict=True):
             own: list[FloatArray] = []
             for which in range(1 + site.counts_peaks):
                 first = firsts[which]
-                firsts[which] += len(layouts) * len(site.protected)
+                firsts[which] += len(layouts) * site.columns
                 own += [
                     item[first : firsts[which]].reshape(len(layouts), -1)[place]
                     for item in both[which]
                 ]
+            guess = _guess_of(own, slice(len(site.protected)))
+            if site.alternatives:
+                on_bays = _guess_of(own, slice(len(site.protected), None))
+                factors = [peak_factor(_CELL_M, charge.tnt_kg) for charge in charges]
+                guess = guess._replace(on_bays=on_bays, peak_factors=np.array(factors))
             hidden = site.hidden(layouts)
-            guesses.append(Guess(*own) if hidden is None else Guess(*own).without(hidden))
+            guesses.append(guess if hidden is None else guess.without(hidden))
         return guesses
 
     def _put_logs(
@@ -463,12 +503,18 @@ class Surrogate:
         site.memory.return_room(room)
         members = len(self.impulse.members)
         for logs in parts:
+            logs = site.with_structures(logs, layers.powers)
             found[0].append(logs[:members].reshape(members, -1))
             if site.counts_peaks:
                 found[1].append(logs[members:].reshape(len(logs) - members, -1))
         place = np.empty(len(layouts), dtype=np.int64)
         place[order] = np.arange(len(place))
         return place
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether its fit has set intervals of both kinds of loads."""
+        return self.fit.impulse is not None and self.fit.peak is not None
 
     def upper_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
@@ -500,6 +546,8 @@ class Surrogate:
             return found
 
         impulse_pa_s = moved(guess.impulse_pa_s, guess.spread, self.fit.impulse)
+        if guess.on_bays is not None:
+            guess = guess._replace(on_bays=self._moved(guess.on_bays, half_widths))
         if guess.peak_pa is None or guess.peak_spread is None:
             return guess._replace(impulse_pa_s=impulse_pa_s)
         peak_pa = moved(guess.peak_pa, guess.peak_spread, self.fit.peak)

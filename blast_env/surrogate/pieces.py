@@ -65,7 +65,7 @@ def log_loads_of(
         room: Gives arrays for a moment.
 
     Returns:
-        Those of all layouts, in the order of the charges (members, layouts, structures).
+        Those of all layouts, in the order of the charges (members, layouts, parts).
     """
     counts = [len(boxes) for of_charge in layouts for boxes in of_charge]
     most = max(sum(map(len, of_charge)) for of_charge in layouts)
@@ -78,7 +78,7 @@ def log_loads_of(
     )
     points, structures = len(site.points.area_m2), len(site.solids)
     members, _, width = layers.constant.shape
-    found = np.empty((members, len(counts), len(site.points.starts)))
+    found = np.empty((members, len(counts), len(site.points.parts)))
     farthest_m = np.empty(len(charges))
 
     def make(room: Room) -> tuple[ApproachArrays, SingleArray, Pieces, Pieces, Bench, Numbers]:
@@ -143,7 +143,7 @@ class PieceKnowledge:
         return self._bytes + len(self._numbers) * self._bytes_of_piece
 
     def log_loads(self, layouts: Sequence[Sequence[Box]], room: Room) -> FloatArray:
-        """Return the logarithm of the load on each structure (members, layouts, structures).
+        """Return the logarithm of the load on each structure (members, layouts, parts).
 
         Args:
             layouts: The pieces of each layout.
@@ -172,7 +172,7 @@ class PieceKnowledge:
                 *(self._layers, self._own, bench, fresh),
             )
         # 2. The loads, and 3. pieces met for the fifth time are kept.
-        loads = np.empty((len(self._base), len(layouts), len(site.points.starts)))
+        loads = np.empty((len(self._base), len(layouts), len(site.points.parts)))
         put_loads(
             *(found, self._start_m, self._scale_m, site, self._scales, self._layers),
             *(self._own, self._base),

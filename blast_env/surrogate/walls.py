@@ -1,6 +1,6 @@
 """Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
 from math import nan
@@ -31,6 +31,10 @@ _MOST_APPROACHES: Final = 16
 """Number of charges of a site kept for a fit, each of up to two megabytes."""
 
 
+_STEP: Final = 0.02
+"""Step of the logarithms of the loads by which bays respond."""
+
+
 class SurrogateSite:
     """A scenario as the surrogate represents it.
 
@@ -41,14 +45,16 @@ class SurrogateSite:
     Args:
         scenario: The scenario.
         memory: The cache of pieces, which sites may share; by default a separate one.
-        spacing: Of the points on walls; by default what the objective needs.
+        spacing: Of the points on walls, for loads on structures alone; by default what the
+            objective needs, with points on each bay where their response counts.
 
     Attributes:
         scenario: The scenario.
         memory: The cache of pieces.
         protected: The protected structures.
         counts_peaks: Whether the objective needs peak overpressures.
-        alternatives: The bays of the facades, if the objective counts their response.
+        alternatives: The bays of the facades of protected structures, if the objective counts
+            their response.
     """
 
     def __init__(
@@ -60,7 +66,11 @@ class SurrogateSite:
             structure for structure in scenario.structures if structure.protected
         )
         self.counts_peaks = scenario.objective.needs_peaks
-        self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
+        names = {structure.name for structure in self.protected}
+        responds = scenario.objective.is_response and spacing is None
+        self.alternatives = tuple(
+            bay for bay in (scenario.alternatives if responds else ()) if bay.structure in names
+        )
         air_m = scenario.air_height_m
         self._solids = np.array(
             [
@@ -70,21 +80,25 @@ class SurrogateSite:
                 for box in structure.boxes_m
             ]
         ).reshape(-1, 5)
-        self._spacing = spacing or (CLOSE if self.counts_peaks else WIDE)
-        self._points = WallPoints.on(self.protected, air_m, self._spacing)
+        self._spacing = spacing
+        bays = [item.bay for item in scenario.named_bays()] if responds else []
+        needed = spacing or (CLOSE if self.counts_peaks else WIDE)
+        self._points = WallPoints.on(self.protected, air_m, needed, bays)
         self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
         self._terraces = list(filter(attrgetter("carries"), scenario.structures))
         self._boxes: dict[Element, Box | None] = {}  # none of a measure
+        of_structures = [bay.structure for bay in self.alternatives]
+        self._bays = {
+            name: slice(of_structures.index(name), of_structures.index(name) + count)
+            for name, count in Counter(of_structures).items()
+        }
         self._triangular = {
-            structure.name: TriangularLoads(
-                [bay for bay in self.alternatives if bay.structure == structure.name]
-            )
-            for structure in self.protected
+            name: TriangularLoads(self.alternatives[own]) for name, own in self._bays.items()
         }
         self._gaps = Gaps(self.protected, scenario)
         self._hidden: dict[Layout, list[bool]] = {}
         self._left: dict[frozenset[str], SurrogateSite] = {}
-        self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
+        self._responses: dict[tuple[str, frozenset[Element], bytes, bytes, float], float] = {}
         self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
 
     @property
@@ -216,31 +230,80 @@ class SurrogateSite:
         """Return the traits of the pieces of a barrier against a charge (pieces, TRAITS)."""
         return piece_traits(approach.ways.start_m, approach.scale_m, self._solids, barrier)
 
+    @property
+    def columns(self) -> int:
+        """Number of loads of a layout: on protected structures, then on bays that respond."""
+        return len(self.protected) + len(self.alternatives)
+
+    def with_structures(self, logs: FloatArray, powers: FloatArray) -> FloatArray:
+        """Return the logarithms of the loads on structures before those on their bays.
+
+        Args:
+            logs: Those on the parts that have a load of their own (members, layouts, parts).
+            powers: Exponents of the means over the walls (members,).
+
+        Returns:
+            Shape (members, layouts, columns).
+        """
+        points = self._points
+        if not self.alternatives:
+            return logs
+        # The power mean over a structure is that of the ones over its parts.
+        area_m2 = np.add.reduceat(points.area_m2, points.parts)
+        first = np.searchsorted(points.parts, points.starts)
+        own = powers[:, np.newaxis, np.newaxis]
+        sums = np.add.reduceat(area_m2 * np.exp(own * logs), first, axis=2)
+        of_structures = np.log(sums / np.add.reduceat(area_m2, first)) / own
+        has_bays = np.array([structure.name in self._bays for structure in self.protected])
+        counts = np.diff([*first.tolist(), len(area_m2)])
+        return np.concatenate((of_structures, logs[:, :, np.repeat(has_bays, counts)]), axis=2)
+
     def bay_damages(
-        self, structure: str, peak_pa: float, impulse_pa_s: float
+        self, structure: str, peak_pa: FloatArray, impulse_pa_s: FloatArray, peak_factor: float
     ) -> tuple[BayDamage, ...]:
-        """Return the damage of the bays of a protected structure under one triangular load."""
-        return self._triangular[structure].damages(peak_pa, impulse_pa_s)
+        """Return the damage of the bays of a protected structure under triangular loads.
+
+        Args:
+            structure: Its name.
+            peak_pa: The peak overpressures on the bays of all structures (bays,).
+            impulse_pa_s: Their impulses per area (bays,).
+            peak_factor: Factor on peaks that makes them as sharp as in the open; the worse counts.
+        """
+        own = self._bays.get(structure)
+        if own is None:
+            return ()
+        loads = _rounded(peak_pa[own]), _rounded(impulse_pa_s[own])
+        return self._triangular[structure].damages(*loads, peak_factor)
 
     def response(
-        self, structure: str, layout: Sequence[Element], peak_pa: float, impulse_pa_s: float
+        self,
+        structure: str,
+        layout: Sequence[Element],
+        peak_pa: FloatArray,
+        impulse_pa_s: FloatArray,
+        peak_factor: float,
     ) -> float:
-        """Return the objective's response measure of a protected structure under a triangular load.
+        """Return the objective's response measure of a protected structure under such loads.
 
         Most layouts differ in the loads of few structures, so results are cached.
 
         Args:
-            structure: Its name.
+            structure: As for `bay_damages`.
             layout: The layout, whose measures harden bays.
-            peak_pa: The peak overpressure.
-            impulse_pa_s: The impulse per area.
+            peak_pa: As for `bay_damages`.
+            impulse_pa_s: As for `bay_damages`.
+            peak_factor: As for `bay_damages`.
         """
+        if structure not in self._bays:
+            return 0.0
         measures = frozenset(element for element in layout if isinstance(element, Measure))
-        asked = structure, measures, peak_pa, impulse_pa_s
+        own = self._bays[structure]
+        loads = peak_pa[own].tobytes(), impulse_pa_s[own].tobytes(), peak_factor
+        asked = structure, measures, *loads
         if asked not in self._responses:
             if measures not in self._named:
                 self._named[measures] = self.scenario.named_bays(measures)
-            bays = self.bay_damages(structure, peak_pa, impulse_pa_s)
+            bays = self.bay_damages(structure, peak_pa, impulse_pa_s, peak_factor)
             objective = self.scenario.objective
             self._responses[asked] = structure_response(bays, self._named[measures], objective)[0]
         return self._responses[asked]
@@ -278,6 +341,12 @@ class SurrogateSite:
         if self._terraces:
             own_m += ground_below_m(self._terraces, rectangle_m)
         return (*rectangle_m, own_m)
+
+
+def _rounded(loads: FloatArray) -> FloatArray:
+    """Return guesses of loads in steps of 2 %, finer than their errors: few loads to respond to."""
+    found: FloatArray = np.exp(_STEP * np.rint(np.log(loads) / _STEP))
+    return found
 
 
 def _in_lines(boxes: Sequence[Rectangle]) -> list[Rectangle]:
