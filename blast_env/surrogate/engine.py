@@ -101,8 +101,8 @@ class SurrogateEngine(Engine):
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
     milliseconds. Agents trained on it must be judged by gas dynamics. It predicts peaks only if
     the objective counts them. Structures that are not protected have no load. The response of
-    facades is that to triangular loads of the predicted impulse and peak, equal on all bays of a
-    structure (`Guess.loads`).
+    facades is that to triangular loads of the predicted impulse and peak on each bay
+    (`Guess.loads`).
 
     Attributes:
         surrogate: The surrogate; by default the bundled one.

@@ -22,8 +22,9 @@ from blast_env.evaluation import (
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.site import Charge, Scenario, save_scenario
-from blast_env.surrogate import SurrogateEngine, packaged_surrogate, site_of
+from blast_env.rules import random_layout
+from blast_env.site import Charge, Scenario, load_scenario, save_scenario
+from blast_env.surrogate import CLOSE, SurrogateEngine, packaged_surrogate, site_of
 from tests.catalogue_sites import WALL, yard_document
 from tests.cli.running import run
 from tests.evaluation.test_walls_without_verdict import CHARGE, WALLS, site
@@ -172,3 +173,39 @@ def test_an_evaluation_by_guesses_says_how_sure_they_are() -> None:
         scenario, (), threats=[LoadCase(CHARGE)], engine=SurrogateEngine(unchecked)
     )
     assert "the surrogate has no intervals: its errors are not known" in bare.notes
+
+
+def test_each_bay_responds_to_its_own_load() -> None:
+    """The post's bays had responded to the mean over both fronts: no hazard, where gas has one."""
+    scenario = load_scenario("guard_post")
+    charge = Charge((17.0, 0.5), 31.0)
+    guessed, computed = (
+        engine.loads(scenario, (), charge, 0) for engine in (SURROGATE, GasEngine())
+    )
+    worst = [
+        {bay.name: max(bay.damage.values()) for bay in loads.bays} for loads in (guessed, computed)
+    ]
+    assert worst[0] == pytest.approx(worst[1], rel=0.2)
+    assert worst[0]["post/south/1/1"] > 4.0 > 2.0 > worst[0]["post/west/1/1"]
+
+
+def test_the_load_on_a_structure_is_that_of_its_bays() -> None:
+    """Its mean impulse and largest peak, for a polygon and several storeys, too."""
+    surrogate = packaged_surrogate()
+    for name in ("guard_post", "car_park"):
+        scenario = load_scenario(name)
+        layout = random_layout(scenario, np.random.default_rng(0))
+        (threat,) = draw_threats(scenario, [0])
+        charge = threat.charge_against(scenario, layout)
+        bays, whole = (
+            surrogate.guess(site, [layout], [charge])
+            for site in (site_of(scenario), site_of(scenario, spacing=CLOSE))
+        )
+        np.testing.assert_allclose(bays.impulse_pa_s, whole.impulse_pa_s, rtol=0.05)
+        assert bays.on_bays is not None
+        assert whole.on_bays is None
+        areas_m2 = np.array([bay.area_m2 for bay in SURROGATE.loads(scenario, layout, charge).bays])
+        assert bays.on_bays.impulse_pa_s.shape == (1, len(areas_m2))
+        if name == "guard_post":  # in the car park networks are far apart, and means are trimmed
+            mean = float(bays.on_bays.impulse_pa_s[0] @ areas_m2 / areas_m2.sum())
+            assert mean == pytest.approx(bays.impulse_pa_s.item(), rel=0.02)

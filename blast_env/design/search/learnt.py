@@ -280,8 +280,8 @@ class SurrogateSearch(Search):
     def _agent_beside(self, scenario: Scenario) -> SamplingAgent | None:
         """Return the agent that a search by guesses begins with; none where the response counts.
 
-        A response comes in steps. Guesses hardly tell an agent's layouts apart there, which then
-        take the blasts of the rules'.
+        The agent learnt to lower impulses. A response comes in steps, and many of its layouts are
+        just before the same one: they take the blasts of better ones.
         """
         return None if scenario.objective.is_response else self.agent
 
