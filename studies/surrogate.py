@@ -539,10 +539,11 @@ def reductions_of(
     evaluator: BlastEvaluator, case: LoadCaseSet, layouts: Sequence[Layout]
 ) -> list[float]:
     """Return the share by which each layout lowers the case's load, by gas dynamics."""
-    asked = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
-    loads = evaluator.loads_of_many(asked)
+    every = ((), *layouts)
+    loads = evaluator.loads_of_many([(own, threat) for own in every for threat in case.threats])
     values = np.array([load.load(case.scenario.objective) for load in loads])
-    unprotected, *own = (case.combined(item) for item in values.reshape(-1, len(case.threats)))
+    of_layouts = zip(values.reshape(-1, len(case.threats)), every, strict=True)
+    unprotected, *own = (case.objective_value(item, layout) for item, layout in of_layouts)
     return [
         float(reduction) for reduction in reductions(np.array(own), np.full(len(own), unprotected))
     ]

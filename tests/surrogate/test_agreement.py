@@ -22,7 +22,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.rules import random_layout
+from blast_env.rules import layouts_by_rule, random_layout
 from blast_env.site import Charge, Scenario, load_scenario, save_scenario
 from blast_env.surrogate import CLOSE, SurrogateEngine, packaged_surrogate, site_of
 from tests.catalogue_sites import WALL, yard_document
@@ -209,3 +209,17 @@ def test_the_load_on_a_structure_is_that_of_its_bays() -> None:
         if name == "guard_post":  # in the car park networks are far apart, and means are trimmed
             mean = float(bays.on_bays.impulse_pa_s[0] @ areas_m2 / areas_m2.sum())
             assert mean == pytest.approx(bays.impulse_pa_s.item(), rel=0.02)
+
+
+def test_searches_by_guesses_count_the_upper_ends_where_facades_respond() -> None:
+    """A search would find layouts just before a step of the response; without intervals it must."""
+    scenario, surrogate = load_scenario("guard_post"), packaged_surrogate()
+    case = LoadCaseSet(scenario, (LoadCase(Charge((17.0, 0.5), 31.0)),))
+    layout = layouts_by_rule(scenario)["long wall near the building"]
+    site = site_of(scenario)
+    guess = surrogate.guess(site, [layout], [Charge((17.0, 0.5), 31.0)])
+    plain, upper = (own.loads(site, [layout]) for own in (guess, surrogate.upper_ends(guess)))
+    assert plain < upper
+    assert Guesses.of(surrogate, case).loads([layout]) == case.objective_value(upper, layout)
+    bare = replace(surrogate, fit=surrogate.fit.model_copy(update={"impulse": None}))
+    assert Guesses.of(bare, case).loads([layout]) == case.objective_value(plain, layout)
