@@ -516,13 +516,17 @@ class Surrogate:
         """Whether its fit has set intervals of both kinds of loads."""
         return self.fit.impulse is not None and self.fit.peak is not None
 
-    def upper_ends(self, guess: Guess) -> Guess:
+    def upper_ends(self, guess: Guess, half_widths: float = 1.0) -> Guess:
         """Return predicted loads at the upper ends of their 95 % intervals.
+
+        Args:
+            guess: The prediction.
+            half_widths: How far above it, in half-widths of the intervals.
 
         Raises:
             BlastEnvError: If the surrogate has no intervals.
         """
-        return self._moved(guess, 1.0)
+        return self._moved(guess, half_widths)
 
     def lower_ends(self, guess: Guess) -> Guess:
         """Return predicted loads at the lower ends of their 95 % intervals.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blast_env.design.search import Guesses
+from blast_env.design.search.learnt import RESPONSE_HALF_WIDTHS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -211,14 +212,15 @@ def test_the_load_on_a_structure_is_that_of_its_bays() -> None:
             assert mean == pytest.approx(bays.impulse_pa_s.item(), rel=0.02)
 
 
-def test_searches_by_guesses_count_the_upper_ends_where_facades_respond() -> None:
+def test_searches_by_guesses_are_on_the_safe_side_where_facades_respond() -> None:
     """A search would find layouts just before a step of the response; without intervals it must."""
     scenario, surrogate = load_scenario("guard_post"), packaged_surrogate()
     case = LoadCaseSet(scenario, (LoadCase(Charge((17.0, 0.5), 31.0)),))
     layout = layouts_by_rule(scenario)["long wall near the building"]
     site = site_of(scenario)
     guess = surrogate.guess(site, [layout], [Charge((17.0, 0.5), 31.0)])
-    plain, upper = (own.loads(site, [layout]) for own in (guess, surrogate.upper_ends(guess)))
+    above = surrogate.upper_ends(guess, RESPONSE_HALF_WIDTHS)
+    plain, upper = (own.loads(site, [layout]) for own in (guess, above))
     assert plain < upper
     assert Guesses.of(surrogate, case).loads([layout]) == case.objective_value(upper, layout)
     bare = replace(surrogate, fit=surrogate.fit.model_copy(update={"impulse": None}))
