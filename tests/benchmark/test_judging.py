@@ -161,7 +161,7 @@ def test_pages_for_researchers_say_what_the_standings_say() -> None:
         assert len(ahead) == len(gains) == 11
         ends += [f"{min(ahead):.0f} to {max(ahead):.0f}"]
         assert begun.lead_p_value(budget) < 0.001
-    said = f"in all eleven problems, by {ends[0]} points**, and without a blast by {ends[1]}."
+    said = f"in all eleven problems, by {ends[0]} points**, and without a blast in ten, by {ends[1]}."
     assert said in texts["benchmark"]
     scores = [f"{begun.score(budget).value:.2f}" for budget in (50, 0)]
     assert f"is {' and '.join(scores)}." in texts["benchmark"]
