@@ -155,7 +155,8 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
 def test_what_a_judge_fails_is_searched_for_again_with_a_margin() -> None:
     """The judge is stricter than the search: it wants more glass, or a wall, than would do."""
     scenario = glazed_yard(target="medium")
-    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
+    threat = replace(THREAT, charge=Charge((2.0, 4.0), 2.0))
+    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (threat,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)
 
     def judge(layout: Layout) -> Verdict:

@@ -195,7 +195,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.packaged_agent train --visits 1500 --first 160 --checked 42 --seeds 3": (
         "--visits 4 --checked 2 --seeds 1"
     ),
-    "python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 20": (
+    "python -m studies.packaged_agent judge --kind item_sites --kind kerb_sites --sites 60": (
         "--sites 2"
     ),
     "python -m studies.packaged_agent judge control_room school_and_clinic visitor_entrance"

@@ -175,9 +175,9 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     assert protected > 0.0
     evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
     assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((unprotected, protected))
-    *_, last = means(evaluation, own.objective)
     expected = Number(protected, "Pa s of cracking").text()
-    assert last.text().startswith(f"with barrier: mean {expected}")
+    lines = [line.text() for line in means(evaluation, own.objective)]
+    assert any(line.startswith(f"with barrier: mean {expected}") for line in lines)
     env = BlastBarrierEnv(scenario=own, action="place", engine="gas")
     env.reset(seed=0, options={"charge_position_m": (2.0, 4.0), "layout": WALL})
     _, _, _, _, info = env.step(env.placement.catalogue.finish)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from blast_env.design.search import Guesses
-from blast_env.design.search.learnt import RESPONSE_HALF_WIDTHS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -219,7 +218,7 @@ def test_searches_by_guesses_are_on_the_safe_side_where_facades_respond() -> Non
     layout = layouts_by_rule(scenario)["long wall near the building"]
     site = site_of(scenario)
     guess = surrogate.guess(site, [layout], [Charge((17.0, 0.5), 31.0)])
-    above = surrogate.upper_ends(guess, RESPONSE_HALF_WIDTHS)
+    above = surrogate.upper_ends(guess, 2.0)
     plain, upper = (own.loads(site, [layout]) for own in (guess, above))
     assert plain < upper
     assert Guesses.of(surrogate, case).loads([layout]) == case.objective_value(upper, layout)

@@ -34,7 +34,7 @@ The latter are the central one and those farthest apart.
 _KEPT: Final = 4
 """Number of best layouts by blasts that the search changes."""
 
-RESPONSE_HALF_WIDTHS: Final = 2.0
+_RESPONSE_HALF_WIDTHS: Final = 2.0
 """How far above their guess loads are by which facades respond, in half-widths of intervals.
 
 These are set for structures: bays err more, and a search finds those that are guessed too low.
@@ -104,7 +104,7 @@ class Guesses:
         if self.case.scenario.objective.is_response and self.surrogate.has_intervals:
             # A response comes in steps: a search finds layouts just before one, beyond which a
             # small error is. So they have to pass well above the guess.
-            guess = self.surrogate.upper_ends(guess, RESPONSE_HALF_WIDTHS)
+            guess = self.surrogate.upper_ends(guess, _RESPONSE_HALF_WIDTHS)
         return guess.loads(self.site, layouts)
 
 
