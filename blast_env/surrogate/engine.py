@@ -184,10 +184,11 @@ class SurrogateEngine(Engine):
         without, behind = (
             f"{text(one)} to {text(other)}" for one, other in zip(low, high, strict=True)
         )
-        return (
+        said = (
             f"95 % intervals of the predictions under the worst threat: {without} without barrier, "
-            f"{behind} with",
+            f"{behind} with"
         )
+        return (f"{said}; set on whole buildings: bays err more" if site.alternatives else said,)
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks."""

@@ -31,7 +31,7 @@ CLOSE: Final = Spacing(1.0, 1.5, 250)
 """Spacing for peaks, which are local, and for the data of a fit."""
 
 WIDE: Final = Spacing(1.5, 2.0, 125)
-"""Spacing for the mean impulse alone: half as many points, equal errors (`studies.surrogate`)."""
+"""Spacing for the mean impulse alone: half as many points, errors hardly larger."""
 
 _BEFORE_M: Final = 0.05
 """Distance of points in front of their wall, so that the wall does not obstruct their paths."""

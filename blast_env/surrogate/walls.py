@@ -98,7 +98,6 @@ class SurrogateSite:
         self._gaps = Gaps(self.protected, scenario)
         self._hidden: dict[Layout, list[bool]] = {}
         self._left: dict[frozenset[str], SurrogateSite] = {}
-        self._responses: dict[tuple[str, frozenset[Element], bytes, bytes, float], float] = {}
         self._named: dict[frozenset[Element], tuple[BayComponents, ...]] = {}
 
     @property
@@ -285,8 +284,6 @@ class SurrogateSite:
     ) -> float:
         """Return the objective's response measure of a protected structure under such loads.
 
-        Most layouts differ in the loads of few structures, so results are cached.
-
         Args:
             structure: As for `bay_damages`.
             layout: The layout, whose measures harden bays.
@@ -297,16 +294,10 @@ class SurrogateSite:
         if structure not in self._bays:
             return 0.0
         measures = frozenset(element for element in layout if isinstance(element, Measure))
-        own = self._bays[structure]
-        loads = peak_pa[own].tobytes(), impulse_pa_s[own].tobytes(), peak_factor
-        asked = structure, measures, *loads
-        if asked not in self._responses:
-            if measures not in self._named:
-                self._named[measures] = self.scenario.named_bays(measures)
-            bays = self.bay_damages(structure, peak_pa, impulse_pa_s, peak_factor)
-            objective = self.scenario.objective
-            self._responses[asked] = structure_response(bays, self._named[measures], objective)[0]
-        return self._responses[asked]
+        if measures not in self._named:
+            self._named[measures] = self.scenario.named_bays(measures)
+        bays = self.bay_damages(structure, peak_pa, impulse_pa_s, peak_factor)
+        return structure_response(bays, self._named[measures], self.scenario.objective)[0]
 
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
         """Return left, bottom, right, top and height of a layout's pieces, m (pieces, 5).

@@ -186,6 +186,8 @@ def test_each_bay_responds_to_its_own_load() -> None:
         {bay.name: max(bay.damage.values()) for bay in loads.bays} for loads in (guessed, computed)
     ]
     assert worst[0] == pytest.approx(worst[1], rel=0.2)
+    (said,) = SURROGATE.doubts(scenario, (), charge)
+    assert said.endswith("set on whole buildings: bays err more")
     assert worst[0]["post/south/1/1"] > 4.0 > 2.0 > worst[0]["post/west/1/1"]
 
 
