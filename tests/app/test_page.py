@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import partial
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -42,6 +43,11 @@ from tests.vehicle_sites import gate_site
 
 Story = Callable[[User, Sessions], Awaitable[None]]
 
+PATIENCE_S = 60.0
+"""How long a user waits for what he should see."""
+PATIENCE = round(PATIENCE_S / 0.1)
+"""The looks that he has in this time."""
+
 
 @contextmanager
 def modules_kept() -> Iterator[None]:
@@ -55,9 +61,15 @@ def modules_kept() -> Iterator[None]:
 
 @asynccontextmanager
 async def page(folder: Path) -> AsyncIterator[tuple[User, Sessions]]:
+    """Yield a user who waits: on a busy machine a page takes longer than the 0.3 s of NiceGUI."""
     sessions = Sessions(WorkFolder(folder), Here())
     async with user_simulation(root=lambda: add_pages(sessions)) as user:
         add_pages(sessions)
+        vars(user).update(
+            should_see=partial(user.should_see, retries=PATIENCE),
+            should_not_see=partial(user.should_not_see, retries=PATIENCE),
+        )
+        vars(user.download)["next"] = partial(user.download.next, timeout=PATIENCE_S)
         yield user, sessions
 
 
@@ -74,6 +86,15 @@ async def opened(user: User, sessions: Sessions, scenario: Scenario) -> Any:
     session = sessions.new(scenario, "begin")
     await user.open(f"/design/{session.folder.design_id}")
     return session
+
+
+async def until(happened: Callable[[], bool]) -> None:
+    """Wait until something has happened, and fail if it does not."""
+    for _ in range(PATIENCE):
+        if happened():
+            return
+        await asyncio.sleep(0.1)
+    pytest.fail("it did not happen")
 
 
 def mouse(user: User, kind: str, x_px: float, y_px: float, button: int = 0) -> None:
@@ -216,7 +237,7 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
         session.blast([1])  # an empty one: no barrier
-        await user.should_see("mean impulse on protected facades: ", retries=10)
+        await user.should_see("mean impulse on protected facades: ")
         (label,) = user.find("mean impulse on protected facades: ").elements
         assert "\N{PLUS-MINUS SIGN}" in str(getattr(label, "text", ""))
         await user.should_see("grid error, from the worst charge")
@@ -358,7 +379,7 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
         await replace_site(user, path)
-        await user.should_see("podium", retries=200)
+        await user.should_see("podium")
         assert session.scenario == site
         fields = {field.label: field for field in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
         for label in ("base height (m)", "terrace"):
@@ -412,7 +433,7 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
         before = session.design
         choose(user, "replace the site from a file")
         await upload(user, "bad.toml", b"schema_version = ")
-        await user.should_see("line 1, column 18", retries=200)
+        await user.should_see("line 1, column 18")
         await user.should_see("Nothing was changed")
         assert session.design == before
 
@@ -451,14 +472,14 @@ def test_a_map_becomes_a_site_with_its_deviations_told(
         await user.should_see("mass of a charge is '110 lb', must be a number in kg TNT")
         mass.value = "50,5"
         user.find(marker="import").click()
-        await user.should_see("no building is protected", retries=200)
+        await user.should_see("no building is protected")
         user.find(marker="sketch").click()
-        await user.should_see("Click the building to protect.", retries=200)
+        await user.should_see("Click the building to protect.")
         user.find("middle of the site, x, y of the file (or all of it)").type("7.5006, 54.80045")
         user.find("width, depth of the site (m), with its middle").type("60, 50")
         user.find("protected buildings (names, separated by commas)").type("Town Hall")
         user.find(marker="import").click()
-        await user.should_see(marker="take-site", retries=200)
+        await user.should_see(marker="take-site")
         await user.should_see("of its outline")
         user.find(marker="take-site").click()
         assert session.scenario.georeference is not None
@@ -481,7 +502,7 @@ def test_the_build_zone_of_a_map_is_kept_where_no_other_is_asked_for(
         user.find("protected buildings (names, separated by commas)").type("Town Hall")
         field_of(user, "build zone around the protected buildings (m)").value = ""
         user.find(marker="import").click()
-        await user.should_see(marker="take-site", retries=200)
+        await user.should_see(marker="take-site")
         user.find(marker="take-site").click()
         zone = session.scenario.zone
         assert (zone.rows, zone.columns) == (8, 64)  # of 32 m x 4 m on the map
@@ -509,13 +530,12 @@ def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
         await user.should_see("protected buildings (names, separated by commas)")
         user.find("protected buildings (names, separated by commas)").type("Library")
         user.find(marker="import").click()
-        await asyncio.sleep(0.1)
+        await until(lambda: bool(started))
         (reading,) = started
         assert user.client is not None
         user.client.delete()
-        assert reading._process.wait(5.0) == -signal.SIGKILL
-        await asyncio.sleep(0.1)
-        assert sessions.of(session.folder.design_id) is not session  # it is opened anew
+        assert reading._process.wait(PATIENCE_S) == -signal.SIGKILL
+        await until(lambda: sessions.of(session.folder.design_id) is not session)  # opened anew
 
     play(tmp_path, story)
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
@@ -546,10 +566,7 @@ def test_not_all_files_are_read_at_once(tmp_path: Path, monkeypatch: pytest.Monk
     async def story(user: User, sessions: Sessions) -> None:
         await user.open("/")
         await upload(user, "x.toml", b"x", times=5)
-        for _ in range(100):
-            await asyncio.sleep(0.1)
-            if len(at_work) == 10:
-                break
+        await until(lambda: len(at_work) == 10)
         assert max(at_work) == 2
         assert at_work[-1] == 0
 

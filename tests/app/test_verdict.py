@@ -119,9 +119,9 @@ def test_the_answer_stands_on_the_page_at_once(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, glazed_hut())
         user.find("Screening").click()
-        await user.should_see("worst place by damage", retries=100)
+        await user.should_see("worst place by damage")
         await user.should_see(kind=ui.table)
         session.put_site("no facade", hut())
-        await user.should_see("Give structures windows or wall panels first", retries=50)
+        await user.should_see("Give structures windows or wall panels first")
 
     play(tmp_path, story)
