@@ -262,11 +262,9 @@ class Editor:
             self.selected = None
             return
         own = self.selected
-        fixed = (ThingKind.GAUGE, *edits.NOWHERE)
-        if own is not None and edits.has(scenario, own) and own.kind not in fixed:
+        if own is not None and edits.has(scenario, own) and edits.has_size(scenario, own):
             box = edits.rectangle_of(scenario, own)
-            near = max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M
-            if near and (box.left, box.bottom) != (box.right, box.top):
+            if max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M:
                 stroke.sizes, stroke.thing = True, own
                 return
         self.selected = edits.thing_at(scenario, x_m, y_m, _HANDLE_M)
@@ -283,7 +281,7 @@ class Editor:
             return
         scenario, thing = self.session.scenario, stroke.thing
         by_m = (x_m - stroke.start_m[0], y_m - stroke.start_m[1])
-        box = edits.rectangle_of(scenario, thing)
+        box = edits.held_m(scenario, thing, stroke.start_m)
         if stroke.sizes:
             end = edits.snapped(x_m), edits.snapped(y_m)
             right = max(end[0], box.left + MODULE_SIDE_M)
@@ -299,7 +297,7 @@ class Editor:
             if stroke.sizes:
                 stroke.made = edits.resized(scenario, thing, (x_m, y_m))
             else:
-                stroke.made = edits.moved(scenario, thing, by_m)
+                stroke.made = edits.moved(scenario, thing, by_m, stroke.start_m)
         except BlastEnvError as error:
             stroke.made = None
             self.ghost = Ghost(target, reason_of(error))
@@ -382,8 +380,9 @@ class Editor:
         self.ghost = Ghost(placing.rectangle_of(scenario, new), reason or "")
 
     def _keep(self, label: str, scenario: Scenario) -> None:
+        settled = edits.settled_names(self.session.scenario, scenario)
         try:
-            notes = self.session.put_site(label, scenario)
+            notes = (*settled, *self.session.put_site(label, scenario))
         except BlastEnvError as error:
             notes = (str(error),)
         if notes:

@@ -10,6 +10,7 @@ from math import hypot
 from typing import Any, Final, NamedTuple
 
 import shapely
+from pydantic import TypeAdapter, ValidationError
 
 from blast_env.bays import STOREY_M
 from blast_env.errors import BlastEnvError
@@ -79,6 +80,8 @@ _DRAWN: Final = (
 _OF_BUILDINGS: Final = ("facade", "protected")
 """Values that all structures of a building share."""
 
+_ON_SIDE: Final = "an entry of a vehicle moves along its side of the border, not away from it"
+_STRUCTURES: Final = TypeAdapter(tuple[AnyStructure, ...])
 _BETTER_GLASS: Final = "window_laminated_6"
 
 
@@ -218,10 +221,21 @@ def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float
     return hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
 
 
-def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
-    """Return the scenario with a thing moved by about `by_m`, onto the grid."""
+def moved(
+    scenario: Scenario, thing: SiteThing, by_m: PointM, at_m: PointM | None = None
+) -> Scenario:
+    """Return the scenario with a thing moved by about `by_m`, onto the grid.
+
+    A vehicle moves by its entries, along their sides of the border; its ground stays.
+
+    Args:
+        at_m: Where it is held. Of a vehicle, only the entry nearest to it moves; all without one.
+    """
     if thing.kind in NOWHERE:
         return scenario
+    vehicle = vehicle_of(scenario, thing)
+    if vehicle is not None:
+        return _with_entries(scenario, thing, vehicle, by_m, at_m)
     corner = rectangle_of(scenario, thing)
     shift = _HALF if thing.kind is ThingKind.GAUGE else 0.0  # gauges are in the middle of cells
     step = [
@@ -238,7 +252,107 @@ def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
         for ring in (own.get("outline_m", []), *own.get("courtyards_m", [])):
             ring[:] = [[_plain(x_m + step[0]), _plain(y_m + step[1])] for x_m, y_m in ring]
 
+    return _settled(scenario, edit)
+
+
+def vehicle_of(scenario: Scenario, thing: SiteThing) -> VehicleSource | None:
+    """Return the vehicle that a thing is, or `None`."""
+    source = scenario.charge[thing.number] if thing.kind is ThingKind.CHARGE else None
+    return source if isinstance(source, VehicleSource) else None
+
+
+def held_m(scenario: Scenario, thing: SiteThing, at_m: PointM) -> Rectangle:
+    """Return the rectangle of what moves when a thing is held at a place: of a vehicle, an entry."""
+    vehicle = vehicle_of(scenario, thing)
+    if vehicle is None:
+        return rectangle_of(scenario, thing)
+    return vehicle.entries[_entry_at(vehicle, at_m)].bounds_m
+
+
+def has_size(scenario: Scenario, thing: SiteThing) -> bool:
+    """Return whether `resized` changes a thing: not gauges, points, vehicles and polygons."""
+    if thing.kind is ThingKind.GAUGE or thing.kind in NOWHERE:
+        return False
+    if thing.kind is ThingKind.STRUCTURE:
+        return scenario.structures[thing.number].footprint is None
+    box = rectangle_of(scenario, thing)
+    return vehicle_of(scenario, thing) is None and box[:2] != box[2:]
+
+
+def _entry_at(vehicle: VehicleSource, at_m: PointM) -> int:
+    """Return the number of the entry nearest to a place."""
+    return min(range(len(vehicle.entries)), key=lambda k: _from_line_m(vehicle.lines_m[k], *at_m))
+
+
+def _with_entries(
+    scenario: Scenario,
+    thing: SiteThing,
+    vehicle: VehicleSource,
+    by_m: PointM,
+    at_m: PointM | None,
+) -> Scenario:
+    """Return the scenario with entries of a vehicle moved along their sides of the border."""
+    chosen = range(len(vehicle.entries)) if at_m is None else (_entry_at(vehicle, at_m),)
+    steps = {}
+    for number in chosen:
+        left, bottom, right, top = vehicle.entries[number].bounds_m
+        along = (right > left, top > bottom)
+        step = [
+            snapped(start + by) - start if is_along else 0.0
+            for start, by, is_along in zip((left, bottom), by_m, along, strict=True)
+        ]
+        if any(step):
+            steps[number] = step
+    if not steps and any(snapped(by) for by in by_m):
+        raise BlastEnvError(_ON_SIDE)
+
+    def edit(document: Document) -> None:
+        entries = _own(document, thing)["entries"]
+        for number, step in steps.items():
+            for key in ("start_m", "end_m"):
+                pairs = zip(entries[number][key], step, strict=True)
+                entries[number][key] = [_plain(at + by) for at, by in pairs]
+
     return changed(scenario, edit)
+
+
+def settled_names(before: Scenario, after: Scenario) -> tuple[str, ...]:
+    """Return the structures that an edit took onto other ground, with the change of their base."""
+    bases_m = {structure.name: structure.base_m for structure in before.structures}
+    return tuple(
+        f"{own.name} stands on the ground below it, from {own.base_m:g} m"
+        f" (before: {bases_m[own.name]:g} m)"
+        for own in after.structures
+        if own.base_m != bases_m.get(own.name, own.base_m)
+    )
+
+
+def _settled(before: Scenario, edit: Callable[[Document], None]) -> Scenario:
+    """Return a changed site on which what stood on the ground below it still does.
+
+    A structure that left its terrace, or whose terrace went, would hang in the air. Structures keep
+    their names and their heights above the ground.
+    """
+    stood_m = {
+        own.name: own.base_m
+        for own in before.structures
+        if not own.carries and own.base_m == ground_below_m(before.structures, own.rectangle_m)
+    }
+
+    def settle(document: Document) -> None:
+        edit(document)
+        try:
+            after = _STRUCTURES.validate_python(document["structures"])
+        except (ValidationError, BlastEnvError):
+            return  # `changed` says what is wrong with them
+        for own, section in zip(after, document["structures"], strict=True):
+            if own.base_m == stood_m.get(own.name):
+                rise_m = ground_below_m(after, own.rectangle_m) - own.base_m
+                section["base_m"] = _plain(own.base_m + rise_m)
+                if own.height_m is not None:
+                    section["height_m"] = _plain(own.height_m + rise_m)
+
+    return changed(before, settle)
 
 
 def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:
@@ -264,7 +378,7 @@ def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:
         elif "end_m" in own:
             own["end_m"] = [_plain(snapped(value)) for value in corner_m]
 
-    return changed(scenario, edit)
+    return _settled(scenario, edit)
 
 
 def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str, Any]) -> Scenario:
@@ -288,7 +402,7 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
         if values.get("threat") in CHARGE_PRESETS:
             own["tnt_kg"] = CHARGE_PRESETS[values["threat"]][0]
 
-    return changed(scenario, edit)
+    return changed(scenario, edit) if "base_m" in values else _settled(scenario, edit)
 
 
 def _parts_of(document: Document, thing: SiteThing | None, own: Document) -> list[Document]:
@@ -310,7 +424,7 @@ def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
         else:
             del table[key][thing.number]
 
-    return changed(scenario, edit)
+    return _settled(scenario, edit)
 
 
 def added(

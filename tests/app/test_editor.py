@@ -20,6 +20,7 @@ from blast_env.geometry import Piece
 from blast_env.plots import STRUCTURE
 from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
+from tests.test_terraces import terraced
 from tests.vehicle_sites import POSTS, gate_site
 
 
@@ -194,6 +195,31 @@ def test_a_structure_is_dragged_and_sized_and_put_back_where_it_cannot_be(editor
     assert "must lie inside the site" in editor.ghost.reason
     editor.release()
     assert editor.session.scenario == before
+
+
+def test_a_vehicle_is_dragged_by_its_entry_or_the_page_says_why_not(tmp_path: Path) -> None:
+    work = WorkFolder(tmp_path)
+    editor = Editor(Session.opened(work.create(gate_site(), "begin"), work, Workers()))
+    stroke(editor, (0.1, 4.0), (0.1, 5.5))
+    (entry,) = editor.scenario.vehicles[0].entries
+    assert (entry.start_m, entry.end_m) == ((0.0, 3.5), (0.0, 7.5))
+    stroke(editor, (0.0, 7.4), (0.0, 6.4))  # at its end, where other things have a handle
+    assert editor.scenario.vehicles[0].entries[0].end_m == (0.0, 6.5)
+    stroke(editor, (0.1, 5.0), (4.0, 5.0))
+    assert "along its side of the border" in editor.message
+    assert editor.scenario.vehicles[0].entries[0].end_m == (0.0, 6.5)
+
+
+def test_a_terrace_that_goes_lets_down_what_stood_on_it_and_says_so(tmp_path: Path) -> None:
+    work = WorkFolder(tmp_path)
+    editor = Editor(Session.opened(work.create(terraced(), "begin"), work, Workers()))
+    editor.selected = SiteThing(ThingKind.STRUCTURE, 1)
+    editor.delete()
+    assert (editor.scenario.structures[0].base_m, editor.scenario.structures[0].height_m) == (
+        0.0,
+        3.0,
+    )
+    assert "hall stands on the ground below it, from 0 m (before: 1 m)" in editor.message
 
 
 def test_tools_draw(editor: Editor) -> None:

@@ -13,6 +13,7 @@ from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests import builders
 from tests.gas_sites import hut
 from tests.test_terraces import HALL, TERRACE, terraced
+from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
 
 COURTYARD = load_scenario("courtyard")
 BUILDING = SiteThing(ThingKind.STRUCTURE)
@@ -170,6 +171,45 @@ def test_what_is_drawn_on_a_terrace_stands_on_it() -> None:
     assert (hut_there.base_m, hut_there.height_m) == (1.0, 3.5)
     beside, thing = edits.added(site, ThingKind.STRUCTURE, (8.5, 10.5), (10.5, 11.5), 2.5)
     assert (beside.structures[-1].base_m, beside.structures[-1].height_m) == (0.0, 2.5)
+
+
+def test_what_stood_on_a_terrace_stands_on_the_ground_after_an_edit() -> None:
+    site, hall, podium = (
+        terraced(),
+        SiteThing(ThingKind.STRUCTURE),
+        SiteThing(ThingKind.STRUCTURE, 1),
+    )
+    bare = edits.removed(site, podium)
+    assert (bare.structures[0].base_m, bare.structures[0].height_m) == (0.0, 3.0)
+    for height_m in (0.5, 2.0):
+        other = edits.with_values(site, podium, {"height_m": height_m}).structures[0]
+        assert (other.base_m, other.height_m) == (height_m, height_m + 3.0)
+    wide = terraced(TERRACE | {"columns": 8})  # the hall hangs over its eastern edge
+    beside = edits.moved(wide, hall, (1.5, 0.0))
+    assert (beside.structures[0].base_m, beside.structures[0].height_m) == (0.0, 3.0)
+    (words,) = edits.settled_names(wide, beside)
+    assert words == "hall stands on the ground below it, from 0 m (before: 1 m)"
+    assert edits.moved(beside, hall, (-1.5, 0.0)) == wide
+    raised = edits.with_values(site, hall, {"base_m": 2.0})
+    assert edits.removed(raised, podium).structures[0].base_m == 2.0  # it hung there
+
+
+def test_an_entry_of_a_vehicle_moves_along_its_side_of_the_border() -> None:
+    sides = [([0.0, 2.0], [0.0, 6.0]), ([0.5, 8.0], [3.0, 8.0])]
+    entries = [{"start_m": start, "end_m": end} for start, end in sides]
+    site, vehicle = gate_site(vehicle_document(entries=entries)), SiteThing(ThingKind.CHARGE)
+    west, north = vehicle_of(edits.moved(site, vehicle, (0.4, 1.1), (0.1, 3.0))).entries
+    assert (west.start_m, west.end_m, north) == (
+        (0.0, 3.0),
+        (0.0, 7.0),
+        vehicle_of(site).entries[1],
+    )
+    west, north = vehicle_of(edits.moved(site, vehicle, (1.0, -1.0))).entries
+    assert (west.start_m, north.end_m) == ((0.0, 1.0), (4.0, 8.0))
+    with pytest.raises(BlastEnvError, match="moves along its side of the border"):
+        edits.moved(site, vehicle, (2.0, 0.0), (0.0, 4.0))
+    with pytest.raises(ScenarioError):
+        edits.moved(site, vehicle, (0.0, 4.0), (0.0, 4.0))  # beyond the corner of the site
 
 
 def test_the_name_of_a_preset_sets_the_mass_of_a_charge() -> None:

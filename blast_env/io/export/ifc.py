@@ -13,7 +13,7 @@ from blast_env.evaluation.engines.pieces import rigid_piece
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece
 from blast_env.io.export.bill import MODULE, LayoutPlan, placed_elements
-from blast_env.io.importing.ifc import PIECE_SET
+from blast_env.io.importing.ifc import PIECE_SET, STRUCTURE_SET
 from blast_env.layout.build_site import barrier_outline, outlines
 from blast_env.site.catalogue import Variant
 from blast_env.units import MODULE_SIDE_M
@@ -23,7 +23,6 @@ with import_extra("ifc", "IFC files"):
     from ifcopenshell.guid import compress
 
 SCHEMA: Final = "IFC4"
-_STRUCTURE_SET: Final = "BlastEnv_Structure"
 
 _WALL_RATIO: Final = 3
 """Least length of a wall over its thickness. Bollards, blocks and planters are shorter."""
@@ -93,7 +92,11 @@ class _Model:
             for body in bodies:
                 block = self._body("IfcWall", outline.name, body, outline.base_m, outline.height_m)
                 block.ObjectType, block.PredefinedType = "block of a structure", "USERDEFINED"
-                self._describe(block, _STRUCTURE_SET, {"Protected": outline.protected})
+                self._describe(
+                    block,
+                    STRUCTURE_SET,
+                    {"Protected": outline.protected, "Carries": section.carries},
+                )
                 buildings.setdefault(section.building_name, []).append(block)
         for name, blocks in buildings.items():
             building = self._placed("IfcBuilding", name)

@@ -40,6 +40,9 @@ PIECE_SET: Final = "BlastEnv_Barrier"
 An `IfcBuildingElementProxy` may be anything, a tree or the ground. With this set it is a piece.
 """
 
+STRUCTURE_SET: Final = "BlastEnv_Structure"
+"""Set of the properties of a structure that blast-env has exported: a block, read as it is."""
+
 _PASSED: Final = ("IfcFeatureElement", "IfcSpace", "IfcSpatialZone", "IfcAnnotation", "IfcGrid")
 """Holes in walls, which are in their shapes, rooms and drawings."""
 
@@ -136,6 +139,13 @@ class _Model:
         reasons, grounds_m = dict[int, str](), list[float]()
         for entity in self._buildings:
             own = [product for key, product in solids.items() if owners[key] == entity]
+            blocks = [solid for solid in own if _block_of(solid)]
+            if blocks:
+                used |= self._add_blocks(entity, blocks)
+                grounds_m.append(self._placed_m(entity))
+                own = [solid for solid in own if solid not in blocks]
+                if not own:
+                    continue
             building = self._building(entity, own)
             grounds_m.append(building.ground_m)
             used |= self._add(building)
@@ -258,6 +268,29 @@ class _Model:
             ledger.add(Fate.MERGED, kind or _PARTS, solid.place, detail=f"of {place}")
         return {solid.element.id() for solid, _ in read}
 
+    def _add_blocks(self, entity: Any, blocks: Sequence[Solid]) -> set[int]:
+        """Add the structures of an exported building, low ones and terraces too; return the ids."""
+        ground_m, whole = self._placed_m(entity), self._place(entity)
+        for solid in blocks:
+            own = _block_of(solid)
+            tags: Tags = {
+                "building": "yes",
+                "name": str(solid.element.Name or entity.Name or ""),
+                "protected": bool(own.get("Protected")),
+                "carries": bool(own.get("Carries")),
+            }
+            self._map.add(
+                MapFeature(
+                    solid.shadow,
+                    tags,
+                    solid.place,
+                    extent_m=(solid.low_m, solid.high_m),
+                    part_of=whole if len(blocks) > 1 else "",
+                    ground_m=ground_m,
+                )
+            )
+        return {solid.element.id() for solid in blocks}
+
     def _add_of_site(self, solids: Sequence[Solid], ground_m: float) -> set[int]:
         """Add what stands on the site outside of buildings; return the ids of what is read."""
         used = set()
@@ -312,6 +345,11 @@ def _is_piece(element: Any) -> bool:
     """Return whether an element is a piece of a barrier that is no wall."""
     is_proxy = element.is_a("IfcBuildingElementProxy")
     return bool(is_proxy and relations.get_pset(element, PIECE_SET))
+
+
+def _block_of(solid: Solid) -> dict[str, Any]:
+    """Return the properties of a structure that blast-env has exported; empty for others."""
+    return relations.get_pset(solid.element, STRUCTURE_SET) or {}
 
 
 def _parts_of(element: Any) -> list[Any]:

@@ -25,6 +25,7 @@ from blast_env.io.export import (
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import draw_threat
 from blast_env.site import Charge, Scenario
+from tests.builders import block, point, site
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES
 from tests.gas_sites import column, glazed_hut, hut, site_document
@@ -126,6 +127,29 @@ def test_barriers_in_ifc_are_imported_as_the_same_boxes(tmp_path: Path) -> None:
         "wall_x4.250_y7.250": (4.0, 6.5, 4.5, 8.0, 0.0, 2.0),
         "post_x4.250_y4.750": (4.0, 4.5, 4.5, 5.0, 0.0, 1.0),
     }
+
+
+def test_structures_in_ifc_come_back_as_they_are_low_ones_and_terraces_too(tmp_path: Path) -> None:
+    pytest.importorskip("ifcopenshell")
+    structures = (
+        block("podium", 6.0, 2.0, 16, 14, height_m=1.0, carries=True),
+        block("hall", 8.5, 3.5, 10, 8, base_m=1.0, height_m=4.0, protected=True),
+        block("planter", 16.0, 5.0, 4, 4, height_m=1.0),
+        block("tower", 20.0, 5.0, 8, 8, height_m=6.0, building="B"),
+        block("wing", 24.0, 5.0, 8, 4, height_m=5.0, building="B"),
+        block("canopy", 18.0, 12.0, 4, 6, base_m=3.0, height_m=3.5),
+    )
+    scenario = site("mixed", (30.0, 20.0, 8.0), point(2.0, 6.0, 5.0), *structures)
+    path = export_layout(LayoutPlan(scenario, ()), tmp_path / "mixed.ifc")
+    found = import_site(path, ImportOptions(charge_at=((2.0, 6.0),))).scenario.structures
+    named = {structure.name: structure for structure in found}
+    moved_m = np.subtract(named["hall"].rectangle_m, (8.5, 3.5, 12.5, 8.5))
+    for own in scenario.structures:
+        back = named[own.name]
+        assert np.subtract(back.rectangle_m, own.rectangle_m).tolist() == moved_m.tolist()
+        assert (back.base_m, back.height_m) == (own.base_m, own.height_m)
+        assert (back.carries, back.protected) == (own.carries, own.protected)
+    assert named["tower"].building_name == named["wing"].building_name
 
 
 def test_barriers_in_ifc_have_mass_rating_and_cost(tmp_path: Path) -> None:
