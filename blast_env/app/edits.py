@@ -262,7 +262,7 @@ def vehicle_of(scenario: Scenario, thing: SiteThing) -> VehicleSource | None:
 
 
 def held_m(scenario: Scenario, thing: SiteThing, at_m: PointM) -> Rectangle:
-    """Return the rectangle of what moves when a thing is held at a place: of a vehicle, an entry."""
+    """Return the rectangle of what moves if a thing is held there: of a vehicle, an entry."""
     vehicle = vehicle_of(scenario, thing)
     if vehicle is None:
         return rectangle_of(scenario, thing)
