@@ -201,7 +201,7 @@ class ClusterBackend(ParallelBackendBase):
     def __init__(self, client: "Client") -> None:
         super().__init__(nesting_level=0)
         self._client = client
-        self._sent: OrderedDict[int, _Sent] = OrderedDict()
+        self._sent: OrderedDict[int, _SectionOnCluster] = OrderedDict()
         self._counted_s, self._count = -inf, 0
         self._fetched_before: list[Future] = []
         self.work_bytes = 0
@@ -279,7 +279,7 @@ class ClusterBackend(ParallelBackendBase):
             packed = pickle.dumps(section)
             self.section_bytes.append(len(packed))
             content = self._client.submit(_unpacked, packed, _origin(), pure=False)
-            sent = self._sent[key] = _Sent(section, content)
+            sent = self._sent[key] = _SectionOnCluster(section, content)
             if len(self._sent) > _MOST_SENT:
                 self._sent.popitem(last=False)
         self._sent.move_to_end(key)
@@ -331,7 +331,7 @@ def _lost() -> BlastEnvError:
     )
 
 
-class _Sent(NamedTuple):
+class _SectionOnCluster(NamedTuple):
     """A section that workers have, or can get from another, and its place on the cluster.
 
     The section itself is kept, so that no other takes its identity.

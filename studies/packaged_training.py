@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from blast_agents.packaged import CandidateNetwork, Decision, PackagedAgent, Weights
-from blast_agents.policies.candidates import CHANGING, STATIC, Candidates, Standing
+from blast_agents.policies.candidates import CHANGING, STATIC, Candidates, CandidateState
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -132,7 +132,7 @@ def _decisions(
         # Posts come first: where a wall has taken their share of the budget, a way stays open.
         order = sorted(rng.permutation(layout).tolist(), key=lambda own: not is_post[own])
         count = int(rng.integers(len(layout) + 1))
-        state, rest = Standing(candidates), order[count:]
+        state, rest = CandidateState(candidates), order[count:]
         first = [own for own in rest if is_post[own]] or rest
         wanted = np.array(first, dtype=np.int64)
         for index in order[:count]:

@@ -77,7 +77,7 @@ def test_these_are_all_sites_with_heights() -> None:
 
 
 @dataclass(frozen=True)
-class Asked:
+class Inquiry:
     """A site with fixed charges, a layout of it, and the folder of all doors.
 
     Attributes:
@@ -93,7 +93,7 @@ class Asked:
     folder: Path
 
     @classmethod
-    def on(cls, name: str, folder: Path) -> "Asked":
+    def on(cls, name: str, folder: Path) -> "Inquiry":
         """Return a bundled site with one of its charges, or two, and the layout of a rule."""
         site = load_scenario(name)
         if any(structure.protected and structure.facade is None for structure in site.structures):
@@ -153,7 +153,7 @@ def row_of(text: str, *words: str) -> str:
 
 @pytest.mark.parametrize("name", [*COARSE, *WITH_ERRORS, *LARGE])
 def test_all_doors_say_the_same(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = Asked.on(name, tmp_path)
+    asked = Inquiry.on(name, tmp_path)
     options = StudyOptions(
         charges=tuple(asked.charges),
         cells=asked.cells,
@@ -209,7 +209,7 @@ def test_all_doors_say_the_same(name: str, tmp_path: Path, monkeypatch: pytest.M
 
 
 def _says_evaluate(
-    asked: Asked, given: str, buildings: Mapping[str, tuple[str, ...]], found: Evaluation
+    asked: Inquiry, given: str, buildings: Mapping[str, tuple[str, ...]], found: Evaluation
 ) -> None:
     """Text and JSON."""
     text = asked.command("evaluate", "--charge", given, "--seeds", "1")
@@ -237,7 +237,9 @@ def _says_evaluate(
     assert f"worst threat: {found.worst.charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f})" in whole
 
 
-def _says_assess(asked: Asked, charge: Charge, levels: Mapping[str, str], found: Evaluation) -> str:
+def _says_assess(
+    asked: Inquiry, charge: Charge, levels: Mapping[str, str], found: Evaluation
+) -> str:
     """The level and the grid errors; return the probability of the level in words."""
     text = asked.command("assess", "--charges", "16")
     likely = row_of(text, "probability, ", "barrier ").partition(": ")[2]
@@ -290,7 +292,7 @@ def _says_report(
 
 
 def _says_page(
-    asked: Asked,
+    asked: Inquiry,
     worst: int,
     buildings: Mapping[str, tuple[str, ...]],
     consequences: Consequences,

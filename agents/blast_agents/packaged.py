@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, Standing
+from blast_agents.policies.candidates import CHANGING, STATIC, WHOLE, Candidates, CandidateState
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.design.search.learnt import Guesses, SurrogateSearch, case_for, improved
 from blast_env.design.search.package import proposed
@@ -344,14 +344,14 @@ class PackagedAgent:
         batch = LayoutBatch(candidates.empty, candidates.rules, count)
         batch.begin(range(count), candidates.rules, candidates.empty)
         placed = [frozenset[int]()] * count
-        standing = {placed[0]: Standing(candidates)}
+        standing = {placed[0]: CandidateState(candidates)}
         open_ones = np.flatnonzero(~batch.is_full).tolist()
         while open_ones:
             # Many layouts have the same pieces: the network looks at them once.
             sharing: dict[frozenset[int], list[int]] = {}
             for index in open_ones:
                 sharing.setdefault(placed[index], []).append(index)
-            chosen: dict[int, tuple[Standing, int]] = {}
+            chosen: dict[int, tuple[CandidateState, int]] = {}
             for pieces, indices in sharing.items():
                 state = standing[pieces]
                 legal = np.flatnonzero(batch.legal[indices[0]].ravel()[candidates.numbers])

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from blast_env.app.kept import FileRecord, read_kept, write_kept
-from blast_env.app.work import BlastingTask, StatusWriter
+from blast_env.app.work import StatusWriter, TaskWithBlasts
 from blast_env.evaluation import BlastStore, LoadCase
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import BlastMeasurement, GasBlast, GasEngine, GasResult
@@ -97,7 +97,7 @@ PICTURES: Final = "pictures.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class BlastTask(BlastingTask):
+class BlastTask(TaskWithBlasts):
     """Blasts of one layout, one per threat.
 
     Attributes:

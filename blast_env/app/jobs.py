@@ -80,7 +80,7 @@ def _load() -> None:
 
 
 @dataclass
-class Running:
+class TaskRun:
     """A task at work.
 
     Attributes:
@@ -94,7 +94,7 @@ class Running:
     stop_by_s: float | None = None
 
     @classmethod
-    def started(cls, folder: Path, task: Task) -> "Running":
+    def started(cls, folder: Path, task: Task) -> "TaskRun":
         """Start a task."""
         stop, line = _CONTEXT.Pipe(duplex=False)
         process = _CONTEXT.Process(target=_work, args=(folder, task, stop), daemon=True)
@@ -136,7 +136,7 @@ class Workers:
     readings: asyncio.Semaphore = field(
         default_factory=partial(asyncio.Semaphore, _MOST_READINGS), init=False
     )
-    _running: list[Running] = field(default_factory=list, init=False)
+    _running: list[TaskRun] = field(default_factory=list, init=False)
     _waiting: deque[tuple[Path, Task]] = field(default_factory=deque, init=False)
     _loading: Thread | None = field(default=None, init=False)
 
@@ -188,7 +188,7 @@ class Workers:
         while self._waiting and len(self._running) < self.most:
             folder, task = self._waiting.popleft()
             try:
-                self._running.append(Running.started(folder, task))
+                self._running.append(TaskRun.started(folder, task))
             except (OSError, EOFError) as error:
                 end(folder, "failed", f"its process cannot be started: {error}")
 

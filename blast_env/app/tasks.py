@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from blast_env.answers.document import AnyPart, Document
 from blast_env.app import placing
 from blast_env.app.kept import write_kept
-from blast_env.app.work import ANSWER, Answer, BlastingTask, Question, StatusWriter
+from blast_env.app.work import ANSWER, Answer, Question, StatusWriter, TaskWithBlasts
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
 from blast_env.design.search.registry import proposer_row
 from blast_env.evaluation import BlastEvaluator, LoadCaseSet
@@ -30,7 +30,7 @@ _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchTask(BlastingTask):
+class SearchTask(TaskWithBlasts):
     """A search for a layout, or a proposal without a blast.
 
     Attributes:
@@ -94,7 +94,7 @@ class SearchTask(BlastingTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnswerTask(BlastingTask):
+class AnswerTask(TaskWithBlasts):
     """A question on a layout.
 
     Attributes:

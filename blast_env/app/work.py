@@ -118,7 +118,7 @@ Task: TypeAlias = Callable[[StatusWriter], None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class BlastingTask:
+class TaskWithBlasts:
     """What all work with blasts has.
 
     Attributes:

@@ -263,7 +263,7 @@ class SiteAtlas:
                 notes += [(rows, note) for note in own.notes]
         return PlaceFactors(own_edges, factors, faces), notes
 
-    def _facing(self, wall: "_Wall", solid: Solid, structures: Names) -> "_Around":
+    def _facing(self, wall: "_Wall", solid: Solid, structures: Names) -> "_BaySurroundings":
         """Return what shields a wall that faces the charge, and what throws waves back on it.
 
         Args:
@@ -315,7 +315,7 @@ class SiteAtlas:
             own, note = self._adjoining(wall, solid.only(adjoins))
             factors = factors.times(own)
             notes.append(note)
-        return _Around(own_edges, factors, notes)
+        return _BaySurroundings(own_edges, factors, notes)
 
     def _adjoining(self, wall: "_Wall", solid: Solid) -> tuple[Factors, "_Note"]:
         """Return what canopies and podiums do; outside the range they take nothing off."""
@@ -338,7 +338,7 @@ class SiteAtlas:
         note = _Note("a charge that stands against the wall", ~against, np.zeros_like(against))
         return edges.factors_of_edges(self._laws.edges, numbers, to_wall), note
 
-    def _away(self, wall: "_Wall", solid: Solid, structure: str) -> "_Around":
+    def _away(self, wall: "_Wall", solid: Solid, structure: str) -> "_BaySurroundings":
         """Return the shadow on a wall of a rectangular building that faces away.
 
         The law is of buildings that stand alone: another one throws the wave back into the shadow.
@@ -347,7 +347,7 @@ class SiteAtlas:
         own = [index for index, name in enumerate(solid.structures) if name == structure]
         alone = Factors.none(count)
         if len(own) != 1:
-            return _Around(alone, alone, [])
+            return _BaySurroundings(alone, alone, [])
         box = solid.boxes[own[0]]
         normals = np.broadcast_to(wall.normal, (count, 3))
         numbers = shadow.numbers_of_shadow(wall.charge, wall.middles, normals, box)
@@ -358,7 +358,7 @@ class SiteAtlas:
             factors = factors._replace(in_range=np.zeros(count, dtype=bool))
             name = f"{name}, with another on the site that may add load"
         note = _Note.of(name, factors, np.ones(count, dtype=bool))
-        return _Around(alone, factors.where_known(), [note])
+        return _BaySurroundings(alone, factors.where_known(), [note])
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,7 +410,7 @@ class _Note:
 
 
 @dataclass(frozen=True, eq=False)
-class _Around:
+class _BaySurroundings:
     """What is around the bays of one wall."""
 
     edges: Factors

@@ -126,7 +126,7 @@ def judge(
     the package. With --method or --run, it first runs methods and writes their submissions, with
     --scenario on your own sites.
     """
-    judging = _Judging(cell_m, search_cell_m, range(seeds), processes, cache, out)
+    judging = _Judge(cell_m, search_cell_m, range(seeds), processes, cache, out)
     plays = bool(method or run)
     is_secret = secret is not None
     if not plays and (is_secret or scenario):
@@ -276,7 +276,7 @@ def _trained(run: Path, budgets: Sequence[int], definitions: Mapping[str, Defini
 
 
 @dataclass(frozen=True)
-class _Judging:
+class _Judge:
     """Runs methods and judges their submissions, with the options of the command."""
 
     cell_m: float

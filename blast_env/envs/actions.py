@@ -258,7 +258,7 @@ class RowAcrossSight(Actions):
 
 
 @dataclass(frozen=True)
-class Suggested(PlaceAtOnce):
+class PlaceBySuggestion(PlaceAtOnce):
     """The next piece of what one of the rules of thumb proposes, all its rest, or to finish.
 
     There are two actions for each rule that suits the representative scenario: its next piece, and
@@ -334,7 +334,7 @@ ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
         "item_then_place": ItemThenPlace(),
         "item_then_block": ItemThenPlace(block_cells=8),
         "row": RowAcrossSight(),
-        "suggestion": Suggested(),
+        "suggestion": PlaceBySuggestion(),
     }
 )
 """The action spaces, by their names."""

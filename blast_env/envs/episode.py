@@ -5,6 +5,7 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from itertools import islice
 from math import isnan
 from typing import Any, Final
 
@@ -145,7 +146,7 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _AgentView:
     """What an agent is shown from the beginning, with the actions that follow from it."""
 
     observable: Observable
@@ -181,7 +182,7 @@ class _Site:
     rules: PlacementRules
     actions: NumberedActions
     nothing: Mapping[str, Any]
-    shown: OrderedDict[tuple[AnyCharge, ...], _Shown] = field(default_factory=OrderedDict)
+    shown: OrderedDict[tuple[AnyCharge, ...], _AgentView] = field(default_factory=OrderedDict)
     bare: OrderedDict[Any, Assessment] = field(default_factory=OrderedDict)
     observed: dict[str, Any] = field(default_factory=dict)
 
@@ -204,7 +205,7 @@ class _Site:
             _outcome(evaluator, _NOTHING, _NOTHING, ()),
         )
 
-    def shown_of(self, task: Task, charges: tuple[AnyCharge, ...]) -> _Shown:
+    def shown_of(self, task: Task, charges: tuple[AnyCharge, ...]) -> _AgentView:
         """Return what is shown of an episode with some charges."""
         found = self.shown.get(charges)
         if found is not None:
@@ -214,7 +215,9 @@ class _Site:
         observable = Observable(self.empty.scenario, sources, among, self.observed)
         observation = task.observation.episode(observable)
         case = None if task.engine.has_noise else task.case(self.empty.scenario, charges)
-        made = _Shown(observable, observation, self.actions.with_sources(sources), charges, case)
+        made = _AgentView(
+            observable, observation, self.actions.with_sources(sources), charges, case
+        )
         if isinstance(observation, BatchObservation):  # others may keep a state
             _keep(self.shown, charges, made)
         return made
@@ -245,7 +248,7 @@ class Episode:
 
     task: Task
     site: _Site
-    shown: _Shown
+    shown: _AgentView
     seeds: NDArray[np.int64]
     initial: Layout
     chosen: ActionChoice | None = None
@@ -639,7 +642,7 @@ class Episodes:
         ]
         loads = iter(loads_together(asked))
         for episode, layout in due:
-            own = [next(loads) for _ in episode.case.threats]
+            own = list(islice(loads, len(episode.case.threats)))
             episode.loads[layout] = Assessment.of(episode.case, layout, own)
             if not layout:
                 if not episode.loads[()].load > 0.0:

@@ -347,14 +347,14 @@ class BlastEvaluator:
         return BlastKey(site, cells, charge, seed, engine, calibration, code, parts)
 
 
-Asked = tuple[BlastEvaluator, Sequence[Element], LoadCase]
+BlastRequest = tuple[BlastEvaluator, Sequence[Element], LoadCase]
 """The evaluator, the layout and the threat of a blast."""
 
 Kept = TypeVar("Kept", BlastLoads, BlastRecord)
 
 
 def loads_together(
-    asked: Sequence[Asked], processes: int = 1, progress: ProgressCallback | None = None
+    asked: Sequence[BlastRequest], processes: int = 1, progress: ProgressCallback | None = None
 ) -> list[BlastLoads]:
     """Return the loads of blasts on several sites by one engine, run in one batch.
 
@@ -370,7 +370,7 @@ def loads_together(
 
 
 def _together(
-    asked: Sequence[Asked],
+    asked: Sequence[BlastRequest],
     find: Callable[[BlastStore, BlastKey, AnyScenario], Kept | None] | None,
     run: Callable[[Engine, Sequence[EngineBlast]], Iterator[tuple[int, Kept]]],
     keep: Callable[[BlastStore, BlastKey, Kept], None],

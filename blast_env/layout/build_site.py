@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -163,7 +164,7 @@ def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[Struct
     """Return the outlines of the structures that remain with a layout."""
     zone = scenario.build_zone
     removable = () if zone is None else zone.removable
-    may_go = frozenset[str]().union(*[removal.structures for removal in removable])
+    may_go = frozenset[str]().union(*map(attrgetter("structures"), removable))
     found = []
     for section in scenario.structures_with(layout):
         is_square = isinstance(section, ConcreteSquareSection)

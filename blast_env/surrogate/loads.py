@@ -248,7 +248,7 @@ class SiteArrays(NamedTuple):
     curves: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
-class Asked(NamedTuple):
+class LoadRequest(NamedTuple):
     """Charges with layouts against each of them.
 
     Attributes:
@@ -266,7 +266,7 @@ class Asked(NamedTuple):
 
 @compiled(nogil=True, error_model="numpy")
 def put_charges(
-    asked: Asked,
+    asked: LoadRequest,
     site: SiteArrays,
     scales: Scales,
     layers: NetworkLayers,

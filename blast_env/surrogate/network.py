@@ -48,7 +48,7 @@ IntArray = NDArray[np.int64]
 AnyFloats = NDArray[np.floating[Any]]
 _PACKAGED: Final = Path(__file__).with_name("gas.json")
 
-Asked = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
+GuessRequest = tuple[SurrogateSite, Sequence[Sequence[Element]], Sequence[Charge]]
 """A site, its layouts, and the charge against each of them."""
 
 _FEW: Final = 4
@@ -414,7 +414,7 @@ class Surrogate:
         """
         return self.guesses([(site, layouts, charges)])[0]
 
-    def guesses(self, asked: Sequence[Asked]) -> list[Guess]:
+    def guesses(self, asked: Sequence[GuessRequest]) -> list[Guess]:
         """Return the predicted loads of layouts on several sites; see `guess`.
 
         Args:
@@ -436,7 +436,7 @@ class Surrogate:
             for of_site, order in zip(parts, orders, strict=True)
         ]
 
-    def _guesses(self, asked: Sequence[Asked]) -> list[Guess]:
+    def _guesses(self, asked: Sequence[GuessRequest]) -> list[Guess]:
         """Return the same for layouts that take no structure away."""
         found: list[list[FloatArray]] = [[], []]
         places = [self._put_logs(*one, found) for one in asked]

@@ -21,8 +21,8 @@ from blast_env.surrogate.approach import ApproachArrays, charge_row, check_withi
 from blast_env.surrogate.layers import SingleArray, whole
 from blast_env.surrogate.loads import (
     INTEGER,
-    Asked,
     Bench,
+    LoadRequest,
     NetworkLayers,
     Numbers,
     Pieces,
@@ -70,7 +70,7 @@ def log_loads_of(
     counts = [len(boxes) for of_charge in layouts for boxes in of_charge]
     most = max(sum(map(len, of_charge)) for of_charge in layouts)
     all_boxes = [box for of_charge in layouts for boxes in of_charge for box in boxes]
-    asked = Asked(
+    asked = LoadRequest(
         np.array([charge_row(charge) for charge in charges]),
         np.array([0, *accumulate(map(len, layouts))]),
         np.array(all_boxes, dtype=np.float64).reshape(-1, 5),

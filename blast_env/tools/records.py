@@ -186,7 +186,7 @@ class Legality(Answer):
     cost: Annotated[float, Field(description="Cost of its legal pieces.")]
 
 
-class GuessedShare(Answer):
+class ShareByGuess(Answer):
     """A prediction of the share of the load that a layout leaves."""
 
     share: Annotated[float, Field(description="Share of the load without a barrier that remains.")]
@@ -206,7 +206,7 @@ class BuildingLoad(Record):
     validity: str
 
 
-class BlastedShare(Record):
+class ShareByBlast(Record):
     """The result of a blast."""
 
     share: Annotated[float, Field(description="Share of the load without a barrier that remains.")]
@@ -227,5 +227,5 @@ class Outcome(Answer):
 
     ticket: str
     running: Annotated[bool, Field(description="Whether to call `poll` with the ticket.")]
-    blast: BlastedShare | None = None
+    blast: ShareByBlast | None = None
     score: Score | None = None

@@ -36,15 +36,15 @@ from blast_env.tables import number_or_none
 from blast_env.tools.guesses import guessed_shares
 from blast_env.tools.records import (
     BUDGET,
-    BlastedShare,
     BuildingLoad,
-    GuessedShare,
     Legality,
     Look,
     Outcome,
     PlacedPiece,
     Proposals,
     Score,
+    ShareByBlast,
+    ShareByGuess,
 )
 from blast_env.tools.sight import element_in, legality_of, look_at, proposals_for
 from blast_env.values import MOST_SEED, generator, whole_number
@@ -169,7 +169,7 @@ class Session:
         found = legality_of(self._problem, layout)
         return Legality(**found, **self._common("exact"))
 
-    def guess(self, layout: Sequence[PlacedPiece | Element]) -> GuessedShare:
+    def guess(self, layout: Sequence[PlacedPiece | Element]) -> ShareByGuess:
         """Return a prediction of the share of the load that a layout leaves.
 
         It is free, and no score depends on it.
@@ -186,7 +186,7 @@ class Session:
                 "which is free: call `guess` again in some seconds"
             )
         share, low, high = guessed_shares(self._problem, *self._surrogate, checked)
-        return GuessedShare(share=share, low=low, high=high, **self._common(self._guess_words))
+        return ShareByGuess(share=share, low=low, high=high, **self._common(self._guess_words))
 
     def blast(self, layout: Sequence[PlacedPiece | Element]) -> Outcome:
         """Return the share of the load that a layout leaves, by a blast.
@@ -318,7 +318,7 @@ class Session:
             words = "no number yet"
             return Outcome(ticket=ticket, running=True, **self._common(words))
         if ticket != self._submitted:
-            found: tuple[BlastedShare, str] = self._jobs[ticket].result()
+            found: tuple[ShareByBlast, str] = self._jobs[ticket].result()
             return Outcome(ticket=ticket, running=False, blast=found[0], **self._common(found[1]))
         with self._lock:
             if self._score is not None:  # another call was given it
@@ -334,7 +334,7 @@ class Session:
         drawn = random_layout(self._problem.scenario, generator(self.seed))
         guessed_shares(self._problem, *self._surrogate, drawn)
 
-    def _blasted(self, ticket: str, layout: Layout) -> tuple[BlastedShare, str]:
+    def _blasted(self, ticket: str, layout: Layout) -> tuple[ShareByBlast, str]:
         """Return the result of a blast, which is charged once it has succeeded."""
         problem = self._problem
         pairs = [(layout, threat) for threat in problem.threats]
@@ -361,7 +361,7 @@ class Session:
         )
         worst = worst_validation(load.validation for own in loads for load in own.protected)
         words = f"{problem.evaluator.engine.describe([problem.scenario])}: {worst.words}"
-        return BlastedShare(share=share, charged=problem.blasts - before, loads=rows), words
+        return ShareByBlast(share=share, charged=problem.blasts - before, loads=rows), words
 
     def _judged(self, layout: Layout) -> Score:
         """Return the score of a layout, by the judge of the benchmark."""

@@ -9,7 +9,6 @@ from blast_env.documents import checked_as
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.tools.records import (
     Answer,
-    GuessedShare,
     LayoutArguments,
     Legality,
     Look,
@@ -18,6 +17,7 @@ from blast_env.tools.records import (
     Outcome,
     Proposals,
     Record,
+    ShareByGuess,
     TicketArguments,
 )
 from blast_env.tools.session import Session
@@ -81,7 +81,7 @@ _TABLE: Final = (
         "Predicts the share of the load that a layout leaves, with a 95 % interval. Free, never "
         "scored, and sometimes wrong.",
         LayoutArguments,
-        GuessedShare,
+        ShareByGuess,
         Session.guess,
     ),
     Tool(

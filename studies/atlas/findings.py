@@ -152,8 +152,8 @@ def rule_rows(scenes: Sequence[Bays], known: Laws) -> Iterator[Row]:
     for bays in scenes:
         rows = rows_of(bays) if bays.family in ("wall", "rows", "pieces") else []
         if len(rows) == 2:
-            each = [known.between.log_factors(numbers_of(bays, [row])) for row in rows]
-            factors.append(np.stack(each))
+            factors_of_rows = [known.between.log_factors(numbers_of(bays, [row])) for row in rows]
+            factors.append(np.stack(factors_of_rows))
             together.append(known.between.log_factors(numbers_of(bays, rows)))
             (less,) = less_echoes([bays], [known.opposite, known.beside])
             measured.append(less.log_change)

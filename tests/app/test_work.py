@@ -22,7 +22,7 @@ from blast_env.app import blasts, offers
 from blast_env.app.blasts import PICTURES, BlastPictures
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
-from blast_env.app.jobs import Running, Workers, settle
+from blast_env.app.jobs import TaskRun, Workers, settle
 from blast_env.app.kept import read_kept
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of, usual_threats
@@ -508,11 +508,11 @@ def sleeping(_: StatusWriter) -> None:
     sleep(60.0)
 
 
-def started(workers: Workers, folder: Path) -> Running:
+def started(workers: Workers, folder: Path) -> TaskRun:
     """Return a task that lasts, at work in a folder."""
     folder.mkdir()
     write_status(Status(), folder)
-    running = Running.started(folder, sleeping)
+    running = TaskRun.started(folder, sleeping)
     workers._running.append(running)
     wait(workers, folder, "running")
     return running

@@ -64,7 +64,7 @@ WHOLE: Final = (
 """Features of the site and the layout as a whole."""
 
 
-class _FacedWalls(NamedTuple):
+class _WallsInSight(NamedTuple):
     """The walls as one place of the charge sees them.
 
     Attributes:
@@ -82,7 +82,7 @@ class _FacedWalls(NamedTuple):
     shares: FloatArray
 
     @classmethod
-    def from_charge(cls, from_m: FloatArray, walls: WallPoints) -> "_FacedWalls":
+    def from_charge(cls, from_m: FloatArray, walls: WallPoints) -> "_WallsInSight":
         """Return the walls that a charge faces, weighted by area, slant and distance."""
         way_m = walls.points_m[:, :2] - from_m
         far_m = np.maximum(np.hypot(way_m[:, 0], way_m[:, 1]), _LEAST_M)
@@ -121,7 +121,7 @@ class _View(NamedTuple):
     first: IntArray
     last: IntArray
     hidden: FloatArray
-    faced: _FacedWalls
+    faced: _WallsInSight
     scale_m: float
 
 
@@ -337,7 +337,7 @@ def _view(
     """Return the candidates as seen from a place of the charge."""
     # 1. The walls that the charge faces.
     from_m = np.array(charge.position_m)
-    faced = _FacedWalls.from_charge(from_m, walls)
+    faced = _WallsInSight.from_charge(from_m, walls)
     ahead, distance_m, half_angle = faced.ahead, faced.distance_m, faced.half_angle
     # 2. The candidates along and aside of the line, and the bearings that they hide.
     half_m = (boxes_m[:, 2:] - boxes_m[:, :2]) / 2.0
@@ -456,7 +456,7 @@ def _kernels() -> Any:
     return candidate_kernels
 
 
-class Standing:
+class CandidateState:
     """What the pieces of a layout that grows mean for the candidates.
 
     Args:
@@ -479,9 +479,9 @@ class Standing:
         self.posts = 0
         self.spent = 0.0
 
-    def grown(self, index: int) -> "Standing":
+    def grown(self, index: int) -> "CandidateState":
         """Return the state with one more piece, by its candidate."""
-        other = Standing.__new__(Standing)
+        other = CandidateState.__new__(CandidateState)
         other._of = self._of
         other._covered, other._gap_m = self._covered.copy(), self._gap_m.copy()
         other._nearest = self._nearest.copy()

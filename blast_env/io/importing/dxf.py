@@ -97,7 +97,7 @@ def read_dxf(site_map: SiteMap) -> None:
         _set_scales(site_map, document)
         _check_entities(path, document)
         site_map.unit_m = _metres_per_unit(path, document, options.units)
-        for feature in _Drawn(site_map, document).features():
+        for feature in _DrawingFeatures(site_map, document).features():
             site_map.add(feature)
         _note_layers(site_map, document)
     if options.crs is not None and site_map.unit_m != 1.0:
@@ -235,7 +235,7 @@ def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
 
 
 @dataclass
-class _Drawn:
+class _DrawingFeatures:
     """The entities of a drawing as features.
 
     Attributes:
