@@ -105,6 +105,16 @@ from numba import njit
 def halved(value):
     return value / 2.0
 """,
+    "pairs.py": """
+from typing import NamedTuple
+
+class Pair(NamedTuple):
+    left: float
+    right: float
+
+def pair():
+    return Pair(1.0, 2.0)
+""",
     "kernel.py": """
 from blast_env.compilation import compiled
 from PACKAGE.numbers import FACTOR
@@ -156,3 +166,24 @@ def test_a_change_of_any_source_compiles_again(package: Path) -> None:
         changed = kernel_of(package)
         assert changed(8.0) == expected, name
         assert sum(changed.stats.cache_hits.values()) == 0, name
+
+
+def test_code_for_a_type_that_has_gone_is_compiled_again(package: Path) -> None:
+    """Numba's index of a function names the types of its arguments."""
+    path = package / "kernel.py"
+    kernel = path.read_text(encoding="utf-8")
+    path.write_text(kernel.replace("halved(value)", "value.right"), encoding="utf-8")
+    pairs = package / "pairs.py"
+    for name in ("Pair", "Couple"):
+        pairs.write_text(pairs.read_text(encoding="utf-8").replace("Pair", name), encoding="utf-8")
+        own = kernel_of(package)
+        assert own(importlib.import_module(f"{package.name}.pairs").pair()) == 6.0
+
+
+def test_a_damaged_index_is_written_anew(package: Path) -> None:
+    for index in package.rglob("*.nbi"):
+        index.write_bytes(index.read_bytes()[:40])
+    assert kernel_of(package)(8.0) == 12.0
+    again = kernel_of(package)
+    assert again(8.0) == 12.0
+    assert sum(again.stats.cache_hits.values()) == 1
