@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.validation import NOT_KNOWN
-from blast_env.gas import GasRun
+from blast_env.gas import Gas, GasGrid, GasRun
 from blast_env.results import EndReason
 from blast_env.site import Charge
 from tests.builders import block, zone
@@ -233,6 +233,28 @@ def test_a_gauge_deep_under_pieces_records_the_nearest_air() -> None:
     result = blast_env.simulate(site, layout, engine="gas", until=1e-3)
     assert result.gauges["z_m"].tolist() == [1.75]  # over the pieces
     assert any("gauge buried: lies inside a solid" in note for note in result.gauge_notes)
+
+
+@pytest.mark.parametrize("after", [0, 2])
+def test_too_little_memory_names_the_cells(unprotected: GasResult, after: int) -> None:
+    """Before the first step, or in the middle of a run."""
+    words = (
+        r"a blast of [\d,]+ cells of 0\.5 m and \d+ steps needs some .* GiB, which .*: take larger"
+    )
+
+    class Greedy:
+        """A recorder for which the memory is too small from a step on."""
+
+        def __init__(self, grid: GasGrid) -> None:
+            if not after:
+                raise MemoryError
+
+        def record(self, solver: Gas, step_s: float) -> None:
+            if solver.steps >= after:
+                raise MemoryError
+
+    with pytest.raises(BlastEnvError, match=words):
+        GasRun(GasEngine(), unprotected.run.site, lambda grid: [Greedy(grid)]).advance(1.0)
 
 
 def test_bad_input_is_named(unprotected: GasResult) -> None:

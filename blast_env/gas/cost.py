@@ -5,7 +5,8 @@ the ground within the site, the number of steps until the loads are known, and t
 that a core updates per second. docs/engineers/gas.md compares estimates with measured costs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import cbrt, ceil, expm1, prod
 from typing import Final
@@ -70,8 +71,7 @@ class CostGuess:
         Raises:
             BlastEnvError: If it needs more memory than `MOST_BYTES` or more time than `MOST_S`.
         """
-        what = f"{self.cells:,} {settings.cell_words} and {self.steps:,} steps"
-        instead = "take larger cells" + (", or cells='coarse'" * (not settings.is_growing))
+        what, instead = self._words(settings)
         if self.memory_bytes > MOST_BYTES:
             raise BlastEnvError(
                 f"a blast of {what} would need {self.memory_bytes / 2**30:.1f} GiB, must be at "
@@ -82,6 +82,27 @@ class CostGuess:
                 f"a blast of {what} would take {self.seconds / 3600.0:.1f} h of a core, must be at "
                 f"most {MOST_S / 3600.0:g}: {instead}"
             )
+
+    @contextmanager
+    def within_memory(self, settings: GasSettings) -> Iterator[None]:
+        """Name the cells of a blast for which the memory does not suffice.
+
+        Raises:
+            BlastEnvError: In the place of a `MemoryError` of what is done in this context.
+        """
+        try:
+            yield
+        except MemoryError:
+            what, instead = self._words(settings)
+            raise BlastEnvError(
+                f"a blast of {what} needs some {self.memory_bytes / 2**30:.1f} GiB, which the "
+                f"memory of this computer does not have: {instead}"
+            ) from None
+
+    def _words(self, settings: GasSettings) -> tuple[str, str]:
+        """Return the size of a blast, and what to take instead."""
+        what = f"{self.cells:,} {settings.cell_words} and {self.steps:,} steps"
+        return what, "take larger cells" + (", or cells='coarse'" * (not settings.is_growing))
 
 
 def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0) -> CostGuess:

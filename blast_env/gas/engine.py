@@ -121,14 +121,30 @@ class GasRun:
         watched = watched_structures(site, settings.until)
         self.cost = cost_of_run(settings, site, response_s)
         self.cost.check(settings)
-        # 2. The cells, and the charge as a sphere on them. Its radius leaves out the whole build
+        # 2. The cells and the charge in them, with the recorders.
+        with self.cost.within_memory(settings):
+            self._lay_out(recorders)
+        self.end_reason: EndReason | None = None
+        # 3. When the run may end.
+        self._groups = _groups(self.table, site, settings.until, watched)
+        self._watches_gauges = settings.until == "gauges" and self.gauges is not None
+        places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []
+        self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
+        self._end_s: float | None = None
+        asked_s = settings.until_s
+        self.limit_s = limit_s(site, self._travel_s) + response_s if asked_s is None else asked_s
+
+    def _lay_out(self, recorders: Recorders) -> None:
+        """Make the grid, the recorders and the solver, with the charge in it."""
+        settings, site = self.settings, self.site
+        # 1. The cells, and the charge as a sphere on them. Its radius leaves out the whole build
         # zone, so that all layouts have the same source.
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
         self.remap_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
-        # 3. The recorders.
+        # 2. The recorders.
         self.table = face_table_of(self.grid, site)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
@@ -143,22 +159,13 @@ class GasRun:
             settling=Settling(settings.settled_s * scale, _HOTTEST),
             threads=settings.threads,
         )
-        # 4. The charge on the grid, and when its front has run far enough for larger cells.
+        # 3. The charge on the grid, and when its front has run far enough for larger cells.
         with _notice():
             set_charge(solver, self.charge, self.remap_radius_m)
             doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
         self.solver: Gas = CoarseningSolver(solver, doubled_s) if doubled_s else solver
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
-        self.end_reason: EndReason | None = None
-        # 5. When the run may end.
-        self._groups = _groups(self.table, site, settings.until, watched)
-        self._watches_gauges = settings.until == "gauges" and self.gauges is not None
-        places_m = [gauge.position_m for gauge in site.gauges] if self._watches_gauges else []
-        self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
-        self._end_s: float | None = None
-        asked_s = settings.until_s
-        self.limit_s = limit_s(site, self._travel_s) + response_s if asked_s is None else asked_s
 
     @property
     def time_s(self) -> float:
@@ -184,15 +191,19 @@ class GasRun:
         """Continue until the simulated time is at least `until_s`, or the run has ended.
 
         The division of a run into calls does not change its results.
+
+        Raises:
+            BlastEnvError: If the memory of this computer does not suffice.
         """
-        while self.end_reason is None and self.solver.time_s < until_s:
-            with _notice():
-                self.solver.step()
-            asked = self.settings.until_s is not None
-            if self.solver.time_s >= self.limit_s:
-                self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT
-            elif not asked and self.solver.steps % _LOOK_EVERY == 0:
-                self._look()
+        with self.cost.within_memory(self.settings):
+            while self.end_reason is None and self.solver.time_s < until_s:
+                with _notice():
+                    self.solver.step()
+                asked = self.settings.until_s is not None
+                if self.solver.time_s >= self.limit_s:
+                    self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT
+                elif not asked and self.solver.steps % _LOOK_EVERY == 0:
+                    self._look()
 
     def has_come(self, index: int) -> bool:
         """Return whether sound has reached all corners of a structure in plan, by its index."""
