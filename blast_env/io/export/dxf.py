@@ -14,7 +14,7 @@ from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.io.export.bill import MODULE, LayoutPlan, stock_of
-from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS
+from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, VEHICLE_KEY
 from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
@@ -317,7 +317,8 @@ def _draw(space: Modelspace, feature: Feature) -> None:
 def _describe(entity: DXFGraphic, feature: Feature) -> None:
     """Give the place of a charge its mass, height and weight, which no layer says."""
     if feature.kind is Kinds.CHARGE_PLACE:
-        said = (f"{key}={feature.properties[key]}" for key in CHARGE_KEYS)
+        keys = (key for key in (*CHARGE_KEYS, VEHICLE_KEY) if key in feature.properties)
+        said = (f"{key}={feature.properties[key]}" for key in keys)
         entity.set_xdata(APPLICATION, [(_STRING, text) for text in said])
 
 

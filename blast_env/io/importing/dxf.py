@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, UNITS_M
+from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, UNITS_M, VEHICLE_KEY
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,
@@ -470,7 +470,7 @@ def _own_data(entity: DXFEntity) -> dict[str, str]:
     if not entity.has_xdata(APPLICATION):
         return {}
     pairs = (str(value).partition("=") for _, value in entity.get_xdata(APPLICATION))
-    return {key: value for key, _, value in pairs if key in CHARGE_KEYS}
+    return {key: value for key, _, value in pairs if key in (*CHARGE_KEYS, VEHICLE_KEY)}
 
 
 def _rise(entity: DXFEntity) -> FloatArray:

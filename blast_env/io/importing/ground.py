@@ -23,7 +23,7 @@ from blast_env.io.importing.options import PlaceXY
 from blast_env.io.importing.outlines import check_outlines, mended
 from blast_env.io.importing.passages import Mouths, mouths_of
 from blast_env.io.importing.placing import SitePlacement
-from blast_env.io.importing.things import Role, Thing
+from blast_env.io.importing.things import VEHICLES, Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
 MOST_SOURCES: Final = 100
@@ -82,9 +82,11 @@ def charge_sources(
             "(--charges-from)"
         )
     if not sources and not asked:
+        has_vehicle = any(thing.fault == VEHICLES for thing in site.faulty)
+        words = f"{VEHICLES}; " if has_vehicle else ""
         raise BlastEnvError(
-            f"{site.path}: there is no place for a charge on the site clear of buildings: say "
-            "--charge-at X,Y, with --charges-from where one may be, or --margin for more ground"
+            f"{site.path}: {words}there is no place for a charge on the site clear of buildings: "
+            "say --charge-at X,Y, with --charges-from where one may be, or --margin for more ground"
         )
     used = frozenset(place for place, _ in sources)
     for thing in site.of_role(Role.CHARGE):

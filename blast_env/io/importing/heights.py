@@ -80,8 +80,8 @@ class HeightReader:
             top_m = top_m and top_m + (roof_m or 0.0)
         if not top_m:
             return None, base_m
-        if top_m < base_m:
-            kind = "heights below the underside, taken as the distance from it"
+        if top_m <= base_m:
+            kind = "heights not above the underside, taken as the distance from it"
             detail = f"{top_m:g} m, underside {base_m:g} m"
             self.site_map.ledger.add(Fate.GUESSED, kind, feature.place, detail=detail)
             top_m += base_m

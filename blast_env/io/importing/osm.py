@@ -65,7 +65,7 @@ TOUCHING: Final = "relations with rings that touch or cross, put together from t
 def read_osm(site_map: SiteMap) -> None:
     """Read an OpenStreetMap extract into a map: tagged ways, areas and nodes, in any order.
 
-    Closed ways without `highway` and multipolygon relations are outlines. Objects that JOSM has
+    Closed ways without `highway`, or with `area=yes`, and multipolygon relations are outlines. Objects that JOSM has
     marked as deleted are not read.
     """
     options, path = site_map.options, site_map.path
@@ -197,7 +197,7 @@ class _Extract:
         geometry, fault = _line(places), ""
         if len(places) < len(nodes) or len(places) < 2:
             fault = SHORT if len(nodes) < 2 else CUT
-        elif nodes[0] == nodes[-1] and len(places) >= _LEAST_RING and "highway" not in tags:
+        elif nodes[0] == nodes[-1] and len(places) >= _LEAST_RING and _is_area(tags):
             geometry = Polygon(places)
         self.site_map.add(MapFeature(geometry, tags, f"way {number}", fault))
 
@@ -233,6 +233,11 @@ class _Extract:
                 # Holes that touch the border or each other are not valid, and become notches.
                 geometry = shapely.normalize(area if area.is_valid else area.buffer(0.0))
         self.site_map.add(MapFeature(geometry, tags, place, fault))
+
+
+def _is_area(tags: Tags) -> bool:
+    """Return whether a closed way is an outline: a street is one only if it says so."""
+    return "highway" not in tags or tags.get("area") == "yes"
 
 
 def _by_age(number: int) -> tuple[bool, int]:

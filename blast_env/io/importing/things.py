@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from blast_env.errors import BlastEnvError, named, quoted, value_text
 from blast_env.io.importing.heights import HeightReader
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.options import CHARGE_KEYS, length_m
+from blast_env.io.importing.options import CHARGE_KEYS, VEHICLE_KEY, length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 
 _TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
@@ -155,8 +155,20 @@ _ROADS: Final = frozenset(
     f"{road}{link}"
     for road in ("motorway", "trunk", "primary", "secondary", "tertiary")
     for link in ("", "_link")
-) | {"unclassified", "residential", "living_street", "service", "road", "track"}
+) | {
+    *("unclassified", "residential", "living_street", "service", "road", "track"),
+    *("busway", "bus_guideway", "escape", "raceway"),
+}
 """Values of OpenStreetMap's `highway` for motor vehicles."""
+
+_WAYS: Final = frozenset({"pedestrian", "footway", "path", "cycleway", "bridleway"})
+"""Values of `highway` of ways that are no streets, unless they let motor vehicles in."""
+
+_ENTRY_KEYS: Final = ("motor_vehicle", "motorcar", "vehicle", "hgv", "goods")
+VEHICLES: Final = "entries of vehicles, which an import does not make (a [[charge]] of the site)"
+_ON_FOOT: Final = "pedestrian streets, on which no charge is placed (--charges-from)"
+_PARKED_IN: Final = "car parks in or below buildings, with no charge there (--charge-at)"
+_PARKED_AT: Final = "car parks without an outline, with a charge at their point"
 
 _DIAMETER_KEYS: Final = ("diameter", "diameter_m")
 _ROUND: Final = frozenset({"chimney", "gasometer", "silo", "storage_tank", "water_tower"})
@@ -199,7 +211,7 @@ _CHIEF_KEYS: Final = (
 """Tags that say the kind of an object, by which those without a role are counted."""
 
 _LANE_M: Final = 3.0
-_NARROW: Final = frozenset({"service", "track", "living_street"})
+_NARROW: Final = _WAYS - {"pedestrian"} | {"service", "track", "living_street"}
 _WIDTHS: Final = "widths of streets not in the file"
 
 
@@ -231,7 +243,7 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
         if role is not None:
             whole = wholes.get(str(feature.tags.get("building_id", "")), "")
             found.append(_thing(feature, role, reader, whole))
-        elif fault := _shields(feature.tags):
+        elif fault := _missed(feature.tags):
             found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
         else:
             chief = next((key for key in (*_CHIEF_KEYS, *feature.tags) if key in feature.tags), "")
@@ -244,13 +256,13 @@ def things_of(site_map: SiteMap) -> tuple[Thing, ...]:
     return tuple(found)
 
 
-def _shields(tags: Tags) -> str:
-    """Return what an object is that shields, but that an import does not make; else nothing."""
+def _missed(tags: Tags) -> str:
+    """Return what an object is that an import does not make, though it may matter; else nothing."""
     if _word(tags, "barrier") in _WALLS:
         return "walls of the map, which shield"
     if tags.get("cityjson") in _CONSTRUCTIONS:
         return "constructions that are no buildings, which shield"
-    return ""
+    return _ON_FOOT if _word(tags, "highway") == "pedestrian" else ""
 
 
 def _selectors(site_map: SiteMap) -> dict[Role, tuple[Selector, ...]]:
@@ -292,11 +304,23 @@ def _usual_role(feature: MapFeature, has_layers: bool) -> Role | None:
     if _word(tags, "man_made") in _ROUND:
         return Role.BUILDING
     is_passage = _word(tags, "tunnel") == _PASSAGE
-    if _word(tags, "highway") in _ROADS and (is_passage or not _says(tags, "tunnel")):
+    if _road_of(tags) and (is_passage or not _says(tags, "tunnel")):
         return Role.CHARGE
-    if _word(tags, "amenity") == "parking" and feature.geometry.area > 0.0:
+    if _is_car_park(tags) and not feature.geometry.is_empty:
         return Role.CHARGE
     return Role.NAME if tags.get("text") else None
+
+
+def _road_of(tags: Tags) -> str:
+    """Return the value of `highway` of a way for motor vehicles; an empty text for others."""
+    kinds = [kind.strip() for kind in _word(tags, "highway").split(";")]
+    is_open = any(_word(tags, key) not in ("", *_NO) for key in _ENTRY_KEYS)
+    roads = [kind for kind in kinds if kind in _ROADS or (is_open and kind in _WAYS)]
+    return roads[0] if roads else ""
+
+
+def _is_car_park(tags: Tags) -> bool:
+    return _word(tags, "amenity") == "parking"
 
 
 def _own_kind(tags: Tags, has_layers: bool) -> str:
@@ -345,6 +369,10 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         base_m, top_m = feature.extent_m
     elif is_building:
         top_m, base_m = reader.heights_m(feature)
+    if _is_car_park(tags) and is_building:
+        ledger.add(Fate.GUESSED, _PARKED_IN, feature.place)
+    elif _is_car_park(tags) and not feature.geometry.area:
+        ledger.add(Fate.GUESSED, _PARKED_AT, feature.place)
     part_of = feature.part_of or whole
     tnt_kg = length_m(tags["tnt_kg"]) if "tnt_kg" in tags else None
     if "tnt_kg" in tags and role is Role.CHARGE and not tnt_kg:
@@ -402,6 +430,8 @@ def _fault(feature: MapFeature, role: Role, has_layers: bool) -> str:
         if is_point and _diameter_m(feature, 1.0) is None:
             return "buildings without an outline or a diameter"
     if role is Role.CHARGE:
+        if _own_kind(tags, has_layers) == _CHARGE_PLACE and VEHICLE_KEY in tags:
+            return VEHICLES
         if is_below:
             return "streets and car parks below the ground"
         if _word(tags, "parking") in _NOT_ON_GROUND:
@@ -421,7 +451,7 @@ def _diameter_m(feature: MapFeature, unit_m: float) -> float | None:
 
 def _width_m(feature: MapFeature, reader: HeightReader) -> float | None:
     """Return the width of a street, m; `None` for other places of charges."""
-    road = _word(feature.tags, "highway")
+    road = _road_of(feature.tags)
     if not road or _is_outline(feature.geometry):
         return None
     width_m = length_m(feature.tags.get("width", ""), reader.unit_m)

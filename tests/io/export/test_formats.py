@@ -22,13 +22,14 @@ from blast_env.io.export import (
     export_layout,
     history_table,
 )
-from blast_env.io.importing import ImportOptions, import_site
+from blast_env.io.importing import Fate, ImportOptions, import_site
 from blast_env.layout import draw_threat
 from blast_env.site import Charge, Scenario
 from tests.builders import block, point, site
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES
 from tests.gas_sites import column, glazed_hut, hut, site_document
+from tests.vehicle_sites import gate_site, vehicle_document
 
 RATING = "V/7200[N2A]/64/90:1.2"
 
@@ -150,6 +151,19 @@ def test_structures_in_ifc_come_back_as_they_are_low_ones_and_terraces_too(tmp_p
         assert (back.base_m, back.height_m) == (own.base_m, own.height_m)
         assert (back.carries, back.protected) == (own.carries, own.protected)
     assert named["tower"].building_name == named["wing"].building_name
+
+
+@pytest.mark.parametrize("suffix", [".geojson", ".dxf"])
+def test_an_exported_vehicle_is_named_where_it_is_not_imported(suffix: str, tmp_path: Path) -> None:
+    other = gate_site(charge=[vehicle_document(), point(7.0, 1.0, 5.0)])
+    path = export_layout(LayoutPlan(other, ()), tmp_path / f"gate{suffix}")
+    found = import_site(path)
+    assert len(found.scenario.charge) == 1
+    (entry,) = (own for own in found.ledger.of(Fate.LEFT_OUT) if "vehicle" in own.kind)
+    assert entry.kind.startswith("entries of vehicles, which an import does not make")
+    export_layout(LayoutPlan(gate_site(), ()), path)
+    with pytest.raises(BlastEnvError, match="entries of vehicles"):
+        import_site(path)
 
 
 def test_barriers_in_ifc_have_mass_rating_and_cost(tmp_path: Path) -> None:

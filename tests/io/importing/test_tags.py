@@ -263,7 +263,7 @@ def test_storeys_of_a_roof_alone_are_no_height_of_a_building(tmp_path: Path) -> 
 def test_a_height_below_the_underside_is_the_distance_from_it(tmp_path: Path) -> None:
     site = of_map(tmp_path, beside(height="3", min_height="6"))
     assert heights(site)["features[2]"] == (6.0, 9.0)
-    assert places(site, Fate.GUESSED, "below the underside") == ["features[2]"]
+    assert places(site, Fate.GUESSED, "not above the underside") == ["features[2]"]
 
 
 def test_a_house_of_a_kilometre_is_named() -> None:
@@ -288,6 +288,46 @@ def test_heights_that_hardly_any_building_of_a_kind_has(
 ) -> None:
     site = of_map(tmp_path, beside(building=building, height=height))
     assert bool(entries(site, Fate.GUESSED, "hardly any building has")) is said
+
+
+def test_an_underside_at_the_top_leaves_the_storeys_their_height(tmp_path: Path) -> None:
+    found = of_map(tmp_path, beside(height="6", min_height="6"))
+    assert heights(found)["features[2]"] == (6.0, 12.0)
+    assert places(found, Fate.GUESSED, "not above the underside") == ["features[2]"]
+
+
+@pytest.mark.parametrize(
+    ("tags", "count"),
+    [
+        ({"highway": "busway"}, 2),
+        ({"highway": "residential;service"}, 2),
+        ({"highway": "footway", "motor_vehicle": "yes"}, 1),
+        ({"highway": "pedestrian", "vehicle": "delivery"}, 2),
+        ({"highway": "footway", "motor_vehicle": "no"}, 0),
+        ({"highway": "cycleway"}, 0),
+    ],
+)
+def test_ways_that_motor_vehicles_may_use_are_places_of_charges(
+    tags: dict[str, str], count: int, tmp_path: Path
+) -> None:
+    street = line([(-10.0, -6.0), (30.0, -6.0)], **tags)
+    assert len(segments(of_map(tmp_path, street).scenario)) == count
+
+
+def test_a_pedestrian_street_without_a_charge_is_named(tmp_path: Path) -> None:
+    street = line([(-10.0, -6.0), (30.0, -6.0)], highway="pedestrian")
+    found = of_map(tmp_path, street)
+    assert places(found, Fate.LEFT_OUT, "pedestrian streets") == ["features[2]"]
+
+
+def test_car_parks_of_every_form_have_a_charge_or_a_line(tmp_path: Path) -> None:
+    point = charge(40.0, -5.0) | {"properties": {"amenity": "parking"}}
+    roof = beside(building="roof", amenity="parking")
+    found = of_map(tmp_path, point, roof)
+    assert places(found, Fate.GUESSED, "without an outline, with a charge") == ["features[2]"]
+    assert places(found, Fate.GUESSED, "car parks in or below buildings") == ["features[3]"]
+    sources = [own for own in found.scenario.charge if isinstance(own, PointSource)]
+    assert len(sources) == 2
 
 
 def test_a_mass_in_a_text_is_that_mass(tmp_path: Path) -> None:
