@@ -59,6 +59,7 @@ def screening_answer(
     hidden = "other structures stand before all of each bay: it is not screened"
     yield from lines((f"{building}: {hidden}" for building in found.hidden), "flag")
     for threat in found.threats:
+        yield from lines(_other_words(threat, required), "flag")
         if threat.may_be_low:
             yield Line.of(_low_words(threat), kind="flag")
     around = [row for threat in found.threats for row in _around_rows(threat)]
@@ -94,10 +95,25 @@ def _threat_row(
     )
 
 
+def _other_words(threat: ThreatScreening, required: Sequence[Requirement]) -> Iterator[str]:
+    """Yield the requirements that the place worst by damage keeps, and another place does not."""
+    for requirement in required:
+        if not all(requirement.kept_by(bay.response) for bay in threat.bays):
+            continue
+        for place in threat.others:
+            if not place.keeps(requirement):
+                x_m, y_m = place.charge.position_m
+                yield (
+                    f"{threat.name}: {requirement.words} fails with the charge at ({x_m:.1f},"
+                    f" {y_m:.1f}), the worst place by {place.measure}"
+                )
+                break
+
+
 def _low_words(threat: ThreatScreening) -> str:
     return (
         f"{threat.name}: loads may be low: {threat.charge.tnt_kg:g} kg TNT is"
-        f" {threat.charge.height_m:g} m above the ground and {threat.nearest_m:.1f} m from a bay,"
+        f" {threat.charge.height_m:g} m above the ground and {threat.least_m:.1f} m from a bay,"
         f" {threat.scaled_m:.1f} m/kg^(1/3); nearer than {RAISED_SCALED_M:g}, gas has up to"
         f" {LOW_BY:g} times screening's impulse: a blast by gas decides"
     )

@@ -230,6 +230,42 @@ def test_a_limit_of_the_peak_needs_the_distance_of_the_curve(screened: Screening
     assert not screened.threats[0].keeps(limit)
 
 
+def along_a_street(tnt_kg: float, *structures: dict[str, object]) -> Scenario:
+    """Return structures along a street of 136 m on which a charge may be."""
+    street = {"kind": "segment", "start_m": [2.0, 5.0], "end_m": [138.0, 5.0], "tnt_kg": tnt_kg}
+    return builders.site("street", (140.0, 60.0, 12.0), street, *structures)
+
+
+@pytest.mark.parametrize(
+    ("tnt_kg", "wall", "behind_m", "front_m", "words"),
+    [
+        # The panels of the front fail, where its place is the worst by damage; the panes elsewhere.
+        (20.0, "brick_215", 3.0, 20.0, "gsa 3b"),
+        # Panes break a little, far from the street; no load harms the concrete at the street.
+        (2.0, "concrete_200", 5.0, 30.0, "peak 20"),
+        (2.0, "concrete_200", 5.0, 30.0, "impulse 100"),
+    ],
+)
+def test_a_requirement_is_kept_only_if_no_place_of_the_charge_breaks_it(
+    tnt_kg: float, wall: str, behind_m: float, front_m: float, words: str
+) -> None:
+    required, keys = Requirement.parsed(words), {"height_m": 4.0, "protected": True}
+    near = builders.block("near", 10.0, 5.0 + behind_m, 20, 20, facade={"wall": wall}, **keys)
+    glass = {"glazing": "window_annealed_6"}
+    far = builders.block("far", 100.0, 5.0 + front_m, 20, 20, facade=glass, **keys)
+    street = along_a_street(tnt_kg, near, far)
+    (found,) = screen(street).threats
+    assert all(required.kept_by(bay.response) for bay in found.bays)  # at the worst by damage
+    (place,) = (own.charge for own in found.others if not own.keeps(required))
+    alone = {"kind": "point", "position_m": [*place.position_m], "tnt_kg": tnt_kg}
+    there = builders.site("there", (140.0, 60.0, 12.0), alone, near, far)
+    assert not screen(there).threats[0].keeps(required)
+    assert not found.keeps(required)
+    parts = screening_answer(street, (), screen(street), [required])
+    lines = [part.text() for part in parts if isinstance(part, Line)]
+    assert any(f"{required.words} fails with the charge at (" in line for line in lines)
+
+
 def test_requirements_name_one_scale() -> None:
     assert Requirement.parsed("gsa 3a").level is LevelOfProtection.LOW
     assert Requirement.parsed("iso C").level is LevelOfProtection.MEDIUM

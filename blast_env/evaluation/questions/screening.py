@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import ceil, hypot
+from math import ceil, hypot, inf
 from typing import Final, Literal
 
 import numpy as np
@@ -113,17 +113,40 @@ class BayScreening:
 
 
 @dataclass(frozen=True)
+class OtherPlace:
+    """A place that is the worst one by another measure than damage.
+
+    Attributes:
+        measure: What is worst there: the glass, the peak or the impulse.
+        responses: The response of each bay.
+    """
+
+    measure: str
+    charge: Charge
+    responses: tuple[FacadeResponse, ...]
+
+    def keeps(self, requirement: Requirement) -> bool:
+        """Return whether every bay keeps a requirement there."""
+        return all(map(requirement.kept_by, self.responses))
+
+
+@dataclass(frozen=True)
 class ThreatScreening:
     """The worst place of one threat.
 
     Attributes:
         charge: The charge at its worst place by damage.
+        others: The places with the worst glass, the largest peak and the largest impulse, where
+            they are not the worst one by damage.
+        least_m: Distance of the bay's middle that is nearest to any of the places.
     """
 
     name: str
     charge: Charge
     places: int
     bays: tuple[BayScreening, ...]
+    others: tuple[OtherPlace, ...] = ()
+    least_m: float = inf
 
     @property
     def nearest_m(self) -> float:
@@ -137,13 +160,13 @@ class ThreatScreening:
 
     @property
     def may_breach(self) -> bool:
-        """Whether a bay is so near that its wall may be breached."""
+        """Whether a bay is so near to a place that its wall may be breached."""
         return self.scaled_m < CHECKED_SCALED_DISTANCE[0]
 
     @property
     def scaled_m(self) -> float:
-        """Scaled distance of the nearest bay's middle, m/kg^(1/3)."""
-        return self.nearest_m / float(np.cbrt(self.charge.tnt_kg))
+        """Scaled distance of the bay's middle nearest to any place, m/kg^(1/3)."""
+        return min(self.least_m, self.nearest_m) / float(np.cbrt(self.charge.tnt_kg))
 
     @property
     def may_be_low(self) -> bool:
@@ -169,8 +192,9 @@ class ThreatScreening:
         return f" ({', '.join(doubts)})" if doubts else ""
 
     def keeps(self, requirement: Requirement) -> bool:
-        """Return whether every bay keeps a requirement."""
-        return all(requirement.kept_by(bay.response) for bay in self.bays)
+        """Return whether every bay keeps a requirement, whichever the place of the charge."""
+        here = all(requirement.kept_by(bay.response) for bay in self.bays)
+        return here and all(place.keeps(requirement) for place in self.others)
 
 
 @dataclass(frozen=True)
@@ -685,7 +709,47 @@ def _screened(
                 edges=float(own.edges.middle[index, 0]),
             )
         bays.append(found)
-    return ThreatScreening(name, places[worst], len(places), tuple(bays))
+    others = _others(facade, places, worst, peaks, impulses)
+    least_m = float(ways.away_m.min())
+    return ThreatScreening(name, places[worst], len(places), tuple(bays), others, least_m)
+
+
+def _others(
+    facade: _Facade,
+    places: Sequence[Charge],
+    worst: int,
+    peaks: FloatArray,
+    impulses: FloatArray,
+) -> tuple[OtherPlace, ...]:
+    """Return the worst places by glass, peak and impulse, but for the worst one by damage.
+
+    A requirement on one of these is kept only if it is kept there.
+    """
+    numbers, parts = facade.kinds
+    glass = np.zeros(len(places))
+    if any(isinstance(part, Panel) for own in parts for part in own):
+        for kind, own in enumerate(parts):
+            panes, which = [part for part in own if isinstance(part, Pane)], numbers == kind
+            if panes:
+                damage = _tabulated(panes, peaks[:, which], impulses[:, which])
+                glass = np.maximum(glass, damage.max(axis=1))
+    measures = {
+        "glass": glass,
+        "peak": peaks.max(axis=1),
+        "impulse": impulses.max(axis=1),
+    }
+    found: dict[int, list[str]] = {}
+    for measure, most in measures.items():
+        if most.max() > most[worst]:
+            found.setdefault(int(most.argmax()), []).append(measure)
+    return tuple(
+        OtherPlace(
+            " and ".join(words),
+            places[index],
+            tuple(respond(facade.bays, *triangle(peaks[index], impulses[index])).each()),
+        )
+        for index, words in found.items()
+    )
 
 
 def _named(atlas: SiteAtlas | None, place: Charge) -> Surroundings | None:

@@ -65,8 +65,8 @@ TOUCHING: Final = "relations with rings that touch or cross, put together from t
 def read_osm(site_map: SiteMap) -> None:
     """Read an OpenStreetMap extract into a map: tagged ways, areas and nodes, in any order.
 
-    Closed ways without `highway`, or with `area=yes`, and multipolygon relations are outlines. Objects that JOSM has
-    marked as deleted are not read.
+    Closed ways without `highway`, or with `area=yes`, and multipolygon relations are outlines.
+    Objects that JOSM has marked as deleted are not read.
     """
     options, path = site_map.options, site_map.path
     options.refuse("OpenStreetMap, which is in longitude and latitude", "units", "crs")

@@ -249,14 +249,14 @@ def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: P
 
 
 def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
-    tags = {"kindless": "x", "storeys_of": 2.0, "levels": 4, "min_height": 2.0}
+    tags = {"kindless": "x", "storeys_of": 5.0, "levels": 4, "min_height": 2.0}
     feature = outline(rectangle(0, 0, 6, 4)) | {"properties": tags}
     path = written(tmp_path, feature)
     options: dict[str, Any] = {"protect_near": (1.0, 1.0), "charge_at": ((-5.0, 2.0),)}
     (house,) = imported(path, level_height_m=2.5, **options).buildings
     assert (house.height_m, house.base_m) == (10.0, 2.0)
     (other,) = imported(path, height_from="storeys_of", **options).buildings
-    assert other.height_m == 2.0
+    assert other.height_m == 5.0
 
 
 def kerbs_m(site: SiteImport) -> list[float]:
