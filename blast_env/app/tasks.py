@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from blast_env.answers.document import AnyPart, Document
+from blast_env.answers.document import AnyPart, Document, Number
 from blast_env.app import placing
 from blast_env.app.kept import write_kept
 from blast_env.app.work import ANSWER, Answer, Question, StatusWriter, TaskWithBlasts
@@ -69,8 +69,8 @@ class SearchTask(TaskWithBlasts):
                 writer.share(progress.share)
                 return
             best = placing.plain(progress.best.layout)
-            gone = 100.0 * progress.best.reduction(problem)
-            text = f"{progress.blasts} of {progress.budget} blasts, best reduction {gone:.1f} %"
+            gone = Number.share(progress.best.reduction(problem)).text()
+            text = f"{progress.blasts} of {progress.budget} blasts, best reduction {gone}"
             if best != writer.status.layout:
                 writer.write(share=progress.share, text=text, layout=best)
             elif writer.is_due:
@@ -84,10 +84,11 @@ class SearchTask(TaskWithBlasts):
             text = f"{placing.counted(self.site, result.layout)}, proposed by "
             text += f"{proposer_row(self.method).title}{words and f', {words}'}"
         else:
+            gone = Number.share(result.history[-1].reduction(problem)).text()
             text = (
-                f"reduction {100.0 * result.history[-1].reduction(problem):.1f} % on the blasts of"
-                f" the search, after {result.blasts} of {result.budget}"
-                f" ({problem.evaluator.engine.words}); blast the layout to confirm it"
+                f"reduction {gone} on the blasts of the search, after {result.blasts} of"
+                f" {result.budget} ({problem.evaluator.engine.words}); blast the layout to confirm"
+                " it"
             )
         state = "stopped" if result.interrupted else "done"
         writer.write(state=state, share=1.0, text=text, layout=placing.plain(result.layout))

@@ -8,7 +8,7 @@ on its right; one at another angle is so by the squares of its sine and cosine. 
 and fro between walls has its first images as a measure.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Final
 
@@ -163,6 +163,50 @@ def in_frame(places: FloatArray, turn: float) -> FloatArray:
     return found
 
 
+def _frames(boxes: FloatArray, walls: FloatArray | None) -> Iterator[tuple[float, _Faces]]:
+    """Yield the faces along the axes of each frame, and its angle, rad.
+
+    Walls at an angle are along the axes of a frame of their own.
+    """
+    if len(boxes):
+        yield 0.0, _Faces.of(boxes)
+    if walls is not None and len(walls):
+        turns = (np.arctan2(walls[:, 5], walls[:, 4]) % _RIGHT).round(_DIGITS) % _RIGHT
+        for turn in np.unique(turns).tolist():
+            yield turn, _Faces.of_walls(walls[turns == turn], turn)
+
+
+def _weights(
+    faces: _Faces,
+    charge: FloatArray,
+    bays: FloatArray,
+    normal: FloatArray,
+    distance: FloatArray,
+    cosine: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the weights of echoes, and how soon they follow the direct wave (bays, faces).
+
+    Args:
+        faces: The faces that reflect.
+        charge: See `numbers_of_echoes`, in the frame of the faces; so are the next two.
+        bays: The same.
+        normal: The same.
+        distance: Distance of each bay from the charge (bays,).
+        cosine: Cosine of the incidence of the direct wave (bays,).
+    """
+    (bay, wall), ways, longer, met = _reflected(faces, charge, bays)
+    # (3) The weight of an echo by distance and incidence, relative to the charge itself.
+    own = np.maximum(ways @ normal / np.maximum(longer, _LEAST), 0.0)
+    incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
+        _SLANT + (1.0 - _SLANT) * np.maximum(cosine[bay], 0.0) ** 2
+    )
+    later = np.maximum(longer - distance[bay], _LEAST)
+    weight, closeness = np.zeros((2, len(bays), len(faces.at)))
+    weight[bay, wall] = met * incidence * (distance[bay] / longer) ** _EXPONENT
+    closeness[bay, wall] = met * np.log1p(distance[bay] / later)
+    return weight, closeness
+
+
 def numbers_of_echoes(
     charge: FloatArray,
     bays: FloatArray,
@@ -186,32 +230,14 @@ def numbers_of_echoes(
     way = charge - bays
     distance = np.maximum(np.linalg.norm(way, axis=1), _LEAST)
     cosine = way @ normal / distance
-    sums = np.zeros((len(bays), 3))
-    near = np.zeros((len(bays), 3))
-    # Walls at an angle are along the axes of a frame of their own.
-    frames = [(0.0, _Faces.of(boxes))] if len(boxes) else []
-    if walls is not None and len(walls):
-        turns = (np.arctan2(walls[:, 5], walls[:, 4]) % _RIGHT).round(_DIGITS) % _RIGHT
-        frames += [
-            (turn, _Faces.of_walls(walls[turns == turn], turn))
-            for turn in np.unique(turns).tolist()
-        ]
-    for turn, every in frames:
+    sums, near = np.zeros((2, len(bays), 3))
+    for turn, every in _frames(boxes, walls):
         own_charge, own_bays, own_normal = charge, bays, normal
         if turn:
             own_charge, own_bays = in_frame(charge, turn), in_frame(bays, turn)
             own_normal = in_frame(normal, turn)
         faces = every.towards(own_charge, own_bays, own_normal)
-        (bay, wall), ways, longer, met = _reflected(faces, own_charge, own_bays)
-        # (3) The weight of an echo by distance and incidence, relative to the charge itself.
-        own = np.maximum(ways @ own_normal / np.maximum(longer, _LEAST), 0.0)
-        incidence = (_SLANT + (1.0 - _SLANT) * own**2) / (
-            _SLANT + (1.0 - _SLANT) * np.maximum(cosine[bay], 0.0) ** 2
-        )
-        later = np.maximum(longer - distance[bay], _LEAST)
-        weight, closeness = np.zeros((2, len(bays), len(faces.at)))
-        weight[bay, wall] = met * incidence * (distance[bay] / longer) ** _EXPONENT
-        closeness[bay, wall] = met * np.log1p(distance[bay] / later)
+        weight, closeness = _weights(faces, own_charge, own_bays, own_normal, distance, cosine)
         # (4) Opposite, left and right of the bay's wall.
         outward = np.zeros((len(faces.at), 2))
         outward[np.arange(len(faces.at)), faces.axis] = faces.outward

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 import typer
 
+from blast_env.answers.document import Number
 from blast_env.answers.terminal import print_line
 from blast_env.bundled import GENERATED
 from blast_env.cli.command import writes
@@ -213,10 +214,12 @@ def _print_result(result: "TrainingResult") -> None:
     if best is not None:
         is_one = settings.scenario not in GENERATED and has_few_places(scenario)
         what = "the site's charges" if is_one else "held-out threats"
-        interval = f" (95 % interval {best.low:.1%} to {best.high:.1%})"
+        reduction, low, high = (
+            Number.share(share).text() for share in (best.reduction, best.low, best.high)
+        )
+        interval = "" if isnan(best.low) else f" (95 % interval {low} to {high})"
         print_line(
-            f"best on {what}, after {best.timesteps:,} steps: reduction {best.reduction:.1%}"
-            f"{'' if isnan(best.low) else interval}"
+            f"best on {what}, after {best.timesteps:,} steps: reduction {reduction}{interval}"
         )
     print_written((folder.best_model, folder.evaluations, folder.learning_curve))
     draw = partial(_proposal, folder, scenario, settings.threat)

@@ -213,6 +213,7 @@ def _march(
     last = shells - 1 - _SPARE_SHELLS  # outermost shell that is not still
     steps = 0
     while True:
+        # 1. Where gas moves and where the front is; the end of the march, or of the grid.
         end = min(shells, last + 1 + _SPARE_SHELLS)  # all shells in the first round
         fastest = _primitive(state, gas, end)
         last = _outermost(gas, end, _STILL_SHARE)
@@ -221,8 +222,10 @@ def _march(
         if full or time_s >= until_s or shell_m * (front + 1.0) >= until_front_m:
             return steps, time_s, front, last
         end = min(end, last + 1 + _SPARE_SHELLS)
+        # 2. The step by the fastest signal; the first ones grow from a tenth of it.
         share = min(1.0, 0.1 + (steps_before + steps) / _FIRST_STEPS)
         step_s = share * COURANT * shell_m / fastest
+        # 3. The overpressure at the gauges, between the middles of shells.
         record[steps, 0] = time_s
         for k in range(len(gauges_m)):
             place = gauges_m[k] / shell_m - 0.5
@@ -231,6 +234,8 @@ def _march(
             if i < end - 1:
                 over = gas[2, i] + (place - i) * (gas[2, i + 1] - gas[2, i]) - AIR_PRESSURE_PA
             record[steps, 1 + k] = over
+        # 4. Fluxes through spheres (areas r^2 over volumes r^3 / 3: the 4 pi cancel out), and what
+        # products that burn later release within the step.
         _reconstruct(gas, inner, outer, radii, shell_m, step_s, end)
         _fluxes(inner, outer, flux, end)
         released = later_j_kg * np.exp(-time_s / later_s) * -np.expm1(-step_s / later_s)

@@ -332,6 +332,7 @@ def respond(
         BlastEnvError: If there is not one history per bay.
     """
     check_histories(len(bays), time_s, pressure_pa)
+    # 1. The panes and the panels, each with the history of its bay.
     glazed = [index for index, bay in enumerate(bays) if bay.glazing is not None]
     walled = [index for index, bay in enumerate(bays) if bay.wall is not None]
     panes = [pane_of(bay.glazing) for bay in bays if bay.glazing is not None]
@@ -339,7 +340,7 @@ def respond(
     times_s = (time_s, time_s) if time_s.ndim == 1 else (time_s[glazed], time_s[walled])
     glazing = glazing_responses(panes, times_s[0], pressure_pa[glazed])
     walls = panel_responses(panels, times_s[1], pressure_pa[walled])
-    # Once with suction and once without: see above for the reason.
+    # 2. Once with suction, above, and once without: the worse counts.
     pushed_pa = pushes(time_s, pressure_pa)
     if not np.array_equal(pushed_pa, pressure_pa):
         glazing = glazing.or_worse(glazing_responses(panes, times_s[0], pushed_pa[glazed]))

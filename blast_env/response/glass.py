@@ -370,6 +370,7 @@ def glazing_responses(
         BlastEnvError: If there is not one history per pane.
     """
     check_histories(len(panes), time_s, pressure_pa)
+    # 1. Bending until breakage, and the flight of what the rest of the impulse throws.
     rows, impulse_pa_s = np.zeros((len(panes), 7)), impulses(time_s, pressure_pa)
     for index, pane in enumerate(panes):
         own_s = time_s if time_s.ndim == 1 else time_s[index]
@@ -378,13 +379,15 @@ def glazing_responses(
     thrown_by = np.reshape([pane.thrown_by for pane in panes], (len(panes), 5))
     stretched, speed, flight, hit = _thrown(rows, thrown_by)
     retained = stretched <= 1.0
-    # GSA's order: unbroken, retained by the interlayer, then by how far the fragments fly.
+    # 2. The condition in GSA's order: unbroken, retained by the interlayer, then by how far the
+    # fragments fly.
     condition = np.where(
         probability <= limit_probability,
         GlazingCondition.NO_BREAK,
         np.where(retained, GlazingCondition.RETAINED, flight_condition(flight, hit)),
     )
-    # Progress within each condition to the next. The risk is proportional to the load to the m.
+    # 3. The hazard: progress within each condition to the next. The risk of breakage is
+    # proportional to the load to the m.
     shares = (
         (probability / limit_probability) ** (1.0 / WEIBULL_M),
         stretched,

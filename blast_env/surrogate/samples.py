@@ -1,10 +1,10 @@
 """Samples for a fit of the surrogate: loads of structures, with what its networks see of them."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -114,37 +114,13 @@ class Samples:
         rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
-        # 1. Each site once; each blast once, with the features of all points of its walls.
-        hashes = rows["scenario_hash"].unique()
-        sites = {name: site_of(scenarios[name], spacing=spacing) for name in hashes}
-        features, area_m2, impulses, peaks = [], [], [], []
-        related, solids = _Rows(), []
-        traits: list[SingleArray] = []
-        standing: list[int] = []
-        wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
-        columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
-        of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
-        for (scenario_hash, layout, *numbers), loads in of_blast:
-            site = sites[scenario_hash]
-            x_m, y_m, height_m, tnt_kg = map(float, numbers)
-            approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
-            barrier = site.barrier(elements(layout))
-            of_points = approach.features(barrier).astype(np.float32)
-            of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
-            of_pieces = site.traits(approach, barrier).astype(np.float32)
-            names = [structure.name for structure in site.protected]
-            # 2. Of these, the points of each protected structure: a sample.
-            for *_, structure in loads:
-                own = approach.points_of(names.index(structure))
-                features.append(of_points[own])
-                related.add(of_solids[:, own])
-                solids.append(len(of_solids))
-                traits.append(of_pieces)
-                standing.append(len(approach.solids))
-                area_m2.append(approach.area_m2[own])
-                impulses.append(approach.log_impulse[own])
-                peaks.append(approach.log_peak[own])
-        # 3. The samples in a row, and the cases in which layouts compete.
+        # 1. The points of each structure: a sample. Relations are copied at once.
+        samples, related = [], _Rows()
+        for sample, relations in _samples(rows, scenarios, spacing):
+            samples.append(sample)
+            related.add(relations)
+        features, traits, area_m2, solids, structures, impulses, peaks = zip(*samples, strict=True)
+        # 2. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         counts = np.array([len(feature) for feature in features])
         unknown = [_UNKNOWN] * len(rows)
@@ -159,7 +135,7 @@ class Samples:
             area_m2=np.concatenate(area_m2),
             counts=counts,
             solids=np.array(solids),
-            structures=np.array(standing),
+            structures=np.array(structures),
             impulse=Loads(
                 np.concatenate(impulses),
                 np.log(rows["impulse_pa_s"].to_numpy()),
@@ -177,6 +153,52 @@ class Samples:
             case=place.groupby(list(place.columns)).ngroup().to_numpy(),
             layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
         )
+
+
+class _Sample(NamedTuple):
+    """The points of a structure in a blast; see `Samples` and `Loads`, without the relations."""
+
+    features: SingleArray
+    traits: SingleArray
+    area_m2: FloatArray
+    solids: int
+    structures: int
+    log_impulse: FloatArray
+    log_peak: FloatArray
+
+
+def _samples(
+    rows: pd.DataFrame, scenarios: dict[str, Scenario], spacing: Spacing
+) -> Iterator[tuple[_Sample, FloatArray]]:
+    """Yield the sample of each row, with its relations (solids, points, RELATIONS)."""
+    # 1. Each site once; each blast once, with the features of all points of its walls.
+    hashes = rows["scenario_hash"].unique()
+    sites = {name: site_of(scenarios[name], spacing=spacing) for name in hashes}
+    wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
+    columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
+    of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
+    for (scenario_hash, layout, *numbers), loads in of_blast:
+        site = sites[scenario_hash]
+        x_m, y_m, height_m, tnt_kg = map(float, numbers)
+        approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
+        barrier = site.barrier(elements(layout))
+        features = approach.features(barrier).astype(np.float32)
+        relations = np.concatenate((approach.solids, approach.relations(barrier)))
+        traits = site.traits(approach, barrier).astype(np.float32)
+        names = [structure.name for structure in site.protected]
+        # 2. Of these, the points of each protected structure.
+        for *_, structure in loads:
+            own = approach.points_of(names.index(structure))
+            sample = _Sample(
+                features[own],
+                traits,
+                approach.area_m2[own],
+                len(relations),
+                len(approach.solids),
+                approach.log_impulse[own],
+                approach.log_peak[own],
+            )
+            yield sample, relations[:, own]
 
 
 class _Rows:
