@@ -167,6 +167,21 @@ def test_an_interrupted_run_goes_on_from_its_last_checkpoint(
     assert outcome(finished)[0][0] == replace(result.evaluations[0], seconds=0.0)
 
 
+def test_weights_of_the_last_evaluation_are_kept_if_it_was_there_before(
+    finished: Path, tmp_path: Path
+) -> None:
+    """An evaluation is written before its weights, for which a device may have no more room."""
+    run = RunFolder(Path(copytree(finished, tmp_path / "run")))
+    for path in (run.checkpoint(STEPS), run.last_model):
+        path.unlink()
+    result = resume(run.path)
+    steps = [row.timesteps for row in result.evaluations]
+    assert steps == [ROLLOUT, 2 * ROLLOUT, STEPS, STEPS]
+    assert [*run.checkpoints] == [ROLLOUT, 2 * ROLLOUT, STEPS]
+    last = weights(run.checkpoint(STEPS))
+    assert all(torch.equal(last[name], own) for name, own in weights(run.last_model).items())
+
+
 def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Path) -> None:
     """A step so small that nothing changes shows them."""
     run, slow = tmp_path / "run", hyperparameters({"learning_rate": 1e-12})
