@@ -121,6 +121,15 @@ def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> No
     )
 
 
+def test_weights_whose_layout_hides_a_building_are_never_the_best(finished: Path) -> None:
+    """Its load is no number; at the beginning of a run it stood before all others."""
+    rows = read_evaluations(RunFolder(finished).evaluations)
+    hiding = replace(rows[0], reduction=float("nan"))
+    assert best_of([hiding, *rows]) == best_of(rows)
+    assert best_of([*rows, hiding]) == best_of(rows)
+    assert best_of([hiding]) is hiding
+
+
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
     module = import_module("tensorboard.backend.event_processing.event_accumulator")
     events = module.EventAccumulator(str(finished / "tensorboard"))

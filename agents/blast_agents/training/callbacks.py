@@ -114,10 +114,9 @@ class ValidationCallback(BaseCallback):
             self._seconds + perf_counter() - self._began_s,
             json.dumps(self.settings.judging),
         )
-        best = best_of(self.rows)
-        if best is None or row.reduction > best.reduction:
-            write_model(self.model, self.folder.best_model)
         self.rows.append(row)
+        if best_of(self.rows) is row:
+            write_model(self.model, self.folder.best_model)
         write_evaluations(self.folder.evaluations, self.rows)
         write_model(self.model, self.folder.checkpoint(self.num_timesteps))
         self._recorded_at = self.num_timesteps
