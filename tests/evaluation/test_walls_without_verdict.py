@@ -338,5 +338,5 @@ def test_no_policy_is_shown_a_layout_that_hides_a_building(cache: Path) -> None:
     scenario = site("other")
     evaluators = Evaluators(ENGINE, BlastStore(cache))
     case = LoadCaseSet(scenario, (LoadCase(CHARGE),), charge=CHARGE)
-    assert WALLS == layouts_by_rule(scenario, CHARGE)["wall near the charge"]
+    assert layouts_by_rule(scenario, CHARGE)["wall near the charge"] == WALLS
     assert best_by_rule(evaluators, [case]) == [((), 0.0)]
