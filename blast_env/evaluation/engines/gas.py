@@ -50,15 +50,14 @@ from blast_env.gas.tables import (
     wall_table,
 )
 from blast_env.geometry import WALLS, Element, layout_text
-from blast_env.layout.build_site import build_site, draw_threat, outlines
+from blast_env.layout.build_site import build_site, charge_against, draw_threat, outlines
 from blast_env.provenance import versions
 from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
 from blast_env.response.levels import BayDamage
 from blast_env.results import EndReason, ScaledImpulse
-from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleCharge, find_scenario
-from blast_env.site.blast_site import BlastSite, Charge, in_sight
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site.blast_site import BlastSite, in_sight
 from blast_env.site.structures import buildings_of
-from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import counted_parts, mean_over_area
 from blast_env.tables import table_of, texts
 from blast_env.units import MODULE_SIDE_M
@@ -134,13 +133,13 @@ class GasEngine(GasSettings, Engine):
         return found.record
 
     def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
-        """Return an estimate of the cost of a blast, without building its grid."""
-        if isinstance(charge, VehicleCharge):
-            source = charge.source
-            charge = Charge(source_bounds_m(source).centre, source.tnt_kg)
+        """Return an estimate of the cost of a blast, without building its grid.
+
+        The charge in a vehicle is at its place without a layout.
+        """
         site = BlastSite(
             site_m=scenario.site.rectangle_m,
-            charge=charge,
+            charge=charge_against(scenario, (), charge),
             structures=outlines(scenario),
             air_height_m=scenario.air_height_m,
         )
