@@ -1,7 +1,7 @@
 """The answers of `assess`: the verdict and what it rests on, capacity, screening, barriers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import nan
+from math import ceil, nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from blast_env.answers.document import (
     height_words,
     left_out_words,
     lines,
+    rounded_down,
     without_facade_words,
 )
 from blast_env.answers.pieces import pieces_answer
@@ -26,6 +27,7 @@ from blast_env.evaluation.questions.capacity import LEVELS, Edge, PlaceCapacity
 from blast_env.evaluation.questions.grid_error import (
     FACTOR,
     ORDER,
+    RATIO,
     Effect,
     GridError,
     convergence_index,
@@ -51,6 +53,7 @@ from blast_env.values import count_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_ROUNDING: Final = 1e-9
 RESPONSE_HEADERS: Final = (
     *("building", "level of protection", "panes broken", "worst pane (GSA, ISO)", "worst panel"),
 )
@@ -216,17 +219,21 @@ def _on_coarser_cells(blasts: Blasts, judged: Consequences) -> dict[str, Consequ
 
 
 def response_cells(
-    found: Consequences, building: str, coarse: Consequences | None = None, number: int = 0
+    found: Consequences,
+    building: str,
+    coarse: Consequences | None = None,
+    number: int = 0,
+    ratio: float = RATIO,
 ) -> tuple[AnyCell, ...]:
     """Return the response of a building; of the panes with the grid error.
 
-    `coarse` has the response on coarser cells to the charge of a number.
+    `coarse` has the response to the charge of a number on cells larger by a ratio.
     """
     whole = found.summary(building)
     error = nan
     if coarse is not None and building in coarse.buildings:
         fine = found.under(number).of(building)[0].facade.broken_panes
-        error = convergence_index(fine, coarse.of(building)[0].facade.broken_panes)
+        error = convergence_index(fine, coarse.of(building)[0].facade.broken_panes, ratio)
     panes = Number(whole.broken, error=error, digits=1, flag=f" of {whole.panes}")
     return whole.level, panes, whole.condition, whole.damage
 
@@ -235,11 +242,13 @@ def response_table(blasts: Blasts, found: Mapping[str, Consequences]) -> Table:
     """Return the table of buildings with a facade, by layout: the worst of all charges."""
     judged = found[blasts.judged]
     number, coarse = judged.worst_number, _on_coarser_cells(blasts, judged)
+    error = GridError.of(blasts)
+    ratio = RATIO if error is None else error.ratio
     rows = [
         (
             name,
             building_words(blasts.scenario, building),
-            *response_cells(own, building, coarse.get(name), number),
+            *response_cells(own, building, coarse.get(name), number, ratio),
         )
         for name, own in found.items()
         for building in own.buildings
@@ -316,15 +325,15 @@ def capacity_answer(scenario: Scenario, found: Sequence[PlaceCapacity]) -> Itera
 
 
 def _mass_text(edge: Edge) -> str:
-    """Return the mass in kg, with the sign of a bound at an end of the ladder."""
+    """Return the mass in kg, rounded down, with the sign of a bound at an end of the ladder."""
     sign = (">= " if edge.is_kept else "< ") if edge.is_end else ""
-    return f"{sign}{edge.charge.tnt_kg:.3g}"
+    return f"{sign}{rounded_down(edge.charge.tnt_kg):.3g}"
 
 
 def _stand_off_text(edge: Edge) -> str:
-    """Return the stand-off in m, with the sign of a bound at an end of the ladder."""
+    """Return the stand-off in m, rounded up, with the sign of a bound at an end of the ladder."""
     sign = ("<= " if edge.is_kept else "> ") if edge.is_end else ""
-    return f"{sign}{edge.stand_off_m:.1f}"
+    return f"{sign}{ceil(10.0 * edge.stand_off_m - _ROUNDING) / 10.0:.1f}"
 
 
 def facade_figure(scenario: Scenario, found: Mapping[str, Consequences]) -> "Figure":

@@ -11,7 +11,14 @@ from math import floor, isfinite, isnan, log10, nan
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 
 from blast_env.evaluation.cases import fixed_charges
-from blast_env.site import AnyCharge, ObjectiveSection, Scenario
+from blast_env.site import (
+    AnyCharge,
+    AnySource,
+    ObjectiveSection,
+    Scenario,
+    VehicleCharge,
+    VehicleSource,
+)
 from blast_env.site.blast_site import Charge
 from blast_env.site.structures import without_facade
 from blast_env.statistics import Estimate
@@ -22,6 +29,7 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 _FIGURES: Final = 3  # of a number
 _ERROR_FIGURES: Final = 2
+_ROUNDING: Final = 1e-9
 _PERCENT: Final = 100.0
 _SHOWN: Final = 0.0005  # the least share that is not printed as 0.0 %
 
@@ -126,6 +134,12 @@ class Number:
         `unit` is the unit of the number in that of the estimate.
         """
         return replace(self, spread=(estimate.value - estimate.low) / unit, sampled=samples)
+
+
+def rounded_down(value: float) -> float:
+    """Return a value above 0 with three significant digits that is not above it."""
+    unit = 10.0 ** (floor(log10(value)) + 1 - _FIGURES)
+    return floor(value / unit + _ROUNDING) * unit
 
 
 def _digits(value: float, digits: int | None, figures: int) -> str:
@@ -313,22 +327,44 @@ def height_words(height_m: float) -> str:
 
 
 def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
-    """Yield that some of the fixed charges of a site are not among those of an answer.
+    """Yield that some of the charges of a site are not among those of an answer.
 
-    Nothing is said of charges at other places or of other masses, which the user gave.
+    They are fixed charges, or those of a source of which no charge was drawn. Nothing is said of
+    charges at other places or of other masses, which the user gave.
     """
-    counted = {charge for charge in charges if isinstance(charge, Charge)}
+    own = [*charges]
     fixed = fixed_charges(scenario)
+    if fixed:
+        counted = {charge for charge in own if isinstance(charge, Charge)}
+        left_out = [*_fixed_left_out(fixed, counted)]
+        if 0 < len(left_out) < len(fixed):
+            yield f"not among these: {len(left_out)} of the {len(fixed)} fixed charges of the site"
+        return
+    sources = scenario.charge
+    without = [source for source in sources if not any(_is_of(source, charge) for charge in own)]
+    if 0 < len(without) < len(sources):
+        masses = ", ".join(dict.fromkeys(f"{source.tnt_kg:g} kg" for source in without))
+        count = f"{len(without)} of the {len(sources)} sources of charges"
+        yield f"not among these: any charge of {count} of the site ({masses})"
+
+
+def _fixed_left_out(fixed: Sequence[Charge], counted: Collection[Charge]) -> Iterator[Charge]:
+    """Yield the fixed charges of a site that are not counted."""
     places = {charge._replace(tnt_kg=0.0) for charge in counted}
-    with_own_mass = {charge._replace(tnt_kg=0.0) for charge in counted & {*fixed}}
-    left_out = []
+    with_own_mass = {charge._replace(tnt_kg=0.0) for charge in {*counted} & {*fixed}}
     for charge in fixed:
         place = charge._replace(tnt_kg=0.0)
         # Of several at one place, those that count have their own masses.
         if charge not in counted and (place not in places or place in with_own_mass):
-            left_out.append(charge)
-    if 0 < len(left_out) < len(fixed):
-        yield f"not among these: {len(left_out)} of the {len(fixed)} fixed charges of the site"
+            yield charge
+
+
+def _is_of(source: AnySource, charge: AnyCharge) -> bool:
+    """Return whether a charge may come from a source."""
+    if isinstance(charge, VehicleCharge) or isinstance(source, VehicleSource):
+        return isinstance(charge, VehicleCharge) and charge.source == source
+    mass = charge.tnt_kg, charge.height_m
+    return mass == (source.tnt_kg, source.height_m) and source.has_place(charge.position_m)
 
 
 def without_facade_words(scenario: Scenario, limited: Collection[str] = ()) -> Iterator[str]:

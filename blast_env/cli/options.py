@@ -18,6 +18,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import (
     LoadCase,
     draw_threats,
+    fixed_charges,
     in_turn,
     judged_threats,
     one_per_charge,
@@ -32,6 +33,7 @@ from blast_env.evaluation.engines.contract import (
 from blast_env.response.levels import LevelOfProtection
 from blast_env.sections import PointM
 from blast_env.site import AnyCharge, Scenario
+from blast_env.site.blast_site import Charge
 from blast_env.values import plain_number, printable
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
@@ -242,11 +244,20 @@ class ChargeInput:
     def threats(self, scenario: Scenario, draws: int) -> tuple[LoadCase, ...]:
         """Return drawn threats with the given place and mass, each place once.
 
-        Fixed charges come in turn, each once before any repeats.
+        Fixed charges come in turn, each once before any repeats. At a given place every mass of the
+        site counts once, unless it is given, too.
         """
+        if self.place_m is not None and not fixed_charges(scenario):
+            return self._at_the_place(scenario)
         drawn = in_turn(scenario, draw_threats(scenario, range(draws)))
         fixed = (replace(draw, charge=self.fixed(scenario, draw.charge)) for draw in drawn)
         return one_per_charge(fixed)
+
+    def _at_the_place(self, scenario: Scenario) -> tuple[LoadCase, ...]:
+        """Return a threat of each mass and height at the given place: draws may miss a rare one."""
+        charges = (Charge((0.0, 0.0), own.tnt_kg, own.height_m) for own in scenario.charge)
+        placed = dict.fromkeys(self.fixed(scenario, charge) for charge in charges)
+        return tuple(LoadCase(charge, seed) for seed, charge in enumerate(placed))
 
     def drawn_by(
         self, scenario: Scenario, seeds: Sequence[int], engine: Engine
@@ -254,8 +265,11 @@ class ChargeInput:
         """Return the threats drawn by seeds, with the given place and mass.
 
         Fixed charges come in turn, each once before any repeats; see `judged_threats` for those
-        that are dropped. At a given place a charge of one mass is dropped, too.
+        that are dropped. At a given place a charge of one mass is dropped, too; without noise
+        every mass of the site counts once there.
         """
+        if self.place_m is not None and not (engine.has_noise or fixed_charges(scenario)):
+            return self._at_the_place(scenario)
         drawn = judged_threats(scenario, seeds, has_noise=engine.has_noise)
         threats = tuple(LoadCase(self.fixed(scenario, draw.charge), draw.seed) for draw in drawn)
         is_free = self.place_m is None or engine.has_noise

@@ -1,7 +1,7 @@
 """Maps of the ground: peak overpressure and impulse of a blast of the gas engine."""
 
 from collections.abc import Mapping, Sequence
-from math import cbrt, inf, isfinite, sqrt
+from math import cbrt, ceil, inf, isfinite, sqrt
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -269,7 +269,9 @@ def _reach_m(peak_pa: float, quantity: CurveQuantity, tnt_kg: float, burst: Burs
 
 def _risk_words(threshold: GroundThreshold, charge: Charge) -> str:
     distance_m = open_distance_m(threshold.peak_pa, charge)
-    reach = f"{distance_m:.0f} m in the open" if isfinite(distance_m) else "farther than the curves"
+    reach = (
+        f"{ceil(distance_m)} m in the open" if isfinite(distance_m) else "farther than the curves"
+    )
     return f"{threshold.words}: from {threshold.peak_pa / PA_PER_KPA:.3g} kPa, {reach}"
 
 

@@ -332,11 +332,18 @@ class GlazingResponses:
         return GlazingResponses(*(own[panes] for own in vars(self).values()))
 
     def or_worse(self, other: "GlazingResponses") -> "GlazingResponses":
-        """Return for each pane the response with the larger hazard."""
+        """Return for each pane the response with the larger hazard.
+
+        Deflection, share of broken panes and force on the edges are the larger ones of both: a load
+        under which fewer panes break may throw them farther.
+        """
         worse = other.hazard > self.hazard
-        return GlazingResponses(
-            *(np.where(worse, getattr(other, name), own) for name, own in vars(self).items())
-        )
+        found = {
+            name: np.where(worse, getattr(other, name), own) for name, own in vars(self).items()
+        }
+        for name in ("peak_m", "break_probability", "edge_force_n_m"):
+            found[name] = np.maximum(getattr(self, name), getattr(other, name))
+        return GlazingResponses(**found)
 
 
 @lru_cache(maxsize=256)

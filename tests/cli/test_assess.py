@@ -150,6 +150,24 @@ def test_a_verdict_names_how_many_fixed_charges_it_leaves_out(tmp_path: Path) ->
     assert [said in output for output in outputs] == [True, False, False]
 
 
+def test_a_verdict_names_a_source_of_which_no_charge_was_drawn(tmp_path: Path) -> None:
+    """A lorry that hardly ever comes was left out without a word, and so was its mass."""
+    document = glazed_hut().model_dump(mode="json", exclude_none=True)
+    x_m, y_m = document["charge"][0]["position_m"]
+    way = {"kind": "segment", "start_m": [x_m, y_m], "end_m": [x_m, y_m + 0.5]}
+    document["charge"] = [way | {"tnt_kg": 0.1}, way | {"tnt_kg": 1.0, "weight": 1e-6}]
+    site = tmp_path / "rare.toml"
+    blast_env.save_scenario(Scenario.from_document(document, "rare"), site)
+    drawn, placed = (
+        run(site, "--cells", "coarse", *options)
+        for options in (("--charges", "2"), ("--charge", f"{x_m},{y_m}"))
+    )
+    assert "flag: not among these: any charge of 1 of the 2 sources of charges" in drawn
+    assert "(1 kg)" in drawn
+    assert "not among these" not in placed
+    assert "under 2 charges" in placed
+
+
 def test_a_verdict_names_the_protected_buildings_that_it_does_not_cover(tmp_path: Path) -> None:
     document = glazed_hut().model_dump(mode="json", exclude_none=True)
     shed = document["structures"][0] | {"name": "shed", "corner_m": [8.0, 0.5], "rows": 2}

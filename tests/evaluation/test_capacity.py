@@ -88,3 +88,14 @@ def test_the_end_of_the_ladder_is_a_bound() -> None:
     assert high.cells()[0][1] == "2.0, 4.0, 1.5 m high"
     assert masses.cells() == [("wall", "2.0, 4.0", "4.0 m", ">= 0.1", "< 0.1", "0.1", "0.1")]
     assert stand_offs.cells() == [("wall", "2.0, 4.0", "0.1 kg", "<= 4.0", "> 4.0", "4.0", "4.0")]
+
+
+def test_a_largest_charge_is_rounded_down_and_a_least_stand_off_up() -> None:
+    edges = (Edge(CHARGE._replace(tnt_kg=116.9), 8.04), Edge(CHARGE._replace(tnt_kg=2.239), 8.0))
+    _, masses, stand_offs = capacity_answer(
+        glazed_hut(), [PlaceCapacity("wall", CHARGE, 4.0, edges, edges, 3)]
+    )
+    assert isinstance(masses, Table)
+    assert isinstance(stand_offs, Table)
+    assert masses.cells()[0][-2:] == ("116", "2.23")
+    assert stand_offs.cells()[0][-2:] == ("8.1", "8.0")

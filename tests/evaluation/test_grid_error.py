@@ -7,21 +7,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.answers import Number
+from blast_env.answers.assess import governing, response_table
 from blast_env.answers.document import TYPOGRAPHIC, percent, worse
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     Evaluators,
+    LoadCase,
     LoadCaseSet,
     compare,
     convergence_index,
     draw_threats,
     evaluate_layout,
 )
+from blast_env.evaluation.blasts import NO_BARRIER
+from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines import choosing_engine, final_engine, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.site import load_scenario
+from blast_env.evaluation.questions.verdict import consequences_by_layout
+from blast_env.site import Charge, load_scenario
 from blast_env.statistics import Estimate, reductions
-from tests.gas_sites import WALL, hut, site_document
+from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.scenarios import BALLISTIC_COURTYARD
 
 NUMBERS = st.floats(-1e6, 1e6)
@@ -130,6 +135,24 @@ def test_final_statements_have_it_beside_each_number() -> None:
     assert found["unprotected_load"] == pytest.approx(convergence_index(*unprotected))
     assert evaluation.objective_error == pytest.approx(found["load"])
     assert 0.001 < found["reduction"] < 0.05
+
+
+def test_panes_have_the_error_by_the_ratio_of_the_cells() -> None:
+    """A report may have any two sizes: its panes had the error of cells twice as large."""
+    site, fine = glazed_hut(), GasEngine(cell_m=0.25)
+    threats = [LoadCase(Charge((2.0, 4.0), 0.2))]  # breaks a part of the panes
+    blasts = Campaign.on(site, {NO_BARRIER: ()}, threats, fine, fine.coarser).run(worst=governing)
+    assert blasts.coarse is not None
+    nearer = replace(
+        blasts, engine=GasEngine(cell_m=0.5 / 3.0), coarse=replace(blasts.coarse, engine=fine)
+    )
+    errors = []
+    for own in (blasts, nearer):
+        table = response_table(own, consequences_by_layout(own))
+        (panes,) = (cell for cell in table.rows[0] if isinstance(cell, Number))
+        errors.append(panes.error)
+    assert errors[0] > 0.0
+    assert errors[1] == pytest.approx((2.0**2 - 1.0) / (1.5**2 - 1.0) * errors[0])
 
 
 @pytest.mark.parametrize("engine", ["event", GasEngine(border_m=0.0)])

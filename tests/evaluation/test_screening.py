@@ -10,7 +10,7 @@ from blast_env.answers.screening import screening_answer
 from blast_env.atlas import Laws, SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.questions.screening import Screening, screen, stand_offs
+from blast_env.evaluation.questions.screening import Screening, StandOff, screen, stand_offs
 from blast_env.layout import load_layout
 from blast_env.layout.build_site import build_site
 from blast_env.response import (
@@ -142,6 +142,52 @@ def test_a_component_keeps_its_level_from_its_stand_off_on() -> None:
         for share in (0.97, 1.0)
     ]
     assert levels[0] < LevelOfProtection.LOW <= levels[1]
+
+
+def test_no_stand_off_is_nearer_than_one_that_fails() -> None:
+    """A longer load breaks fewer strong panes, and throws them farther: 151 m failed at 157 m."""
+    name, charge = "window_heat_strengthened_6", Charge((0.0, 0.0), 100.0)
+    pane = catalogue()[name]
+    assert isinstance(pane, Glazing)
+    (glass,) = stand_offs({name: pane}, charge)
+    needed_m = glass.distances_m[LevelOfProtection.LOW]
+    beyond_m = np.linspace(1.001 * needed_m, glass.most_m, 300)
+    peaks, impulses = (
+        kingery_bulmash(own, beyond_m, 100.0)
+        for own in ("reflected_overpressure", "reflected_impulse")
+    )
+    worst = damage_numbers(under_triangle(pane_of(pane), peaks, impulses)).max()
+    assert level_of(float(worst)) >= LevelOfProtection.LOW
+
+
+def test_stand_offs_are_rounded_up() -> None:
+    own = StandOff("w", catalogue()["window_annealed_6"], {}, 4.2, 99.0)
+    words = [own.in_words(distance_m) for distance_m in (12.0, 12.01, 12.49, 4.0, np.inf)]
+    assert words == ["12", "13", "13", "< 5", "> 99"]
+
+
+def two_fronts(mass_kg: float) -> Scenario:
+    """Return a road that ends before an office with windows, and passes a shed nearer."""
+    shed = builders.block("shed", 3.0, 14.0, 8, 10, height_m=3.5, protected=True)
+    office = builders.block("office", 45.0, 26.0, 6, 30, height_m=3.5, protected=True)
+    shed |= {"faces": ["south"], "facade": {"glazing": "window_laminated_12"}}
+    office |= {"faces": ["south"], "facade": {"glazing": "window_annealed_6", "wall": "brick_215"}}
+    road = {"kind": "segment", "start_m": [5.0, 2.0], "end_m": [55.0, 2.0], "tnt_kg": mass_kg}
+    return builders.site("fronts", (60.0, 30.0), road, shed, office)
+
+
+@pytest.mark.parametrize("mass_kg", [0.9705570406262305, 7.531191602914343])
+def test_the_level_is_that_of_the_worst_of_all_places(mass_kg: float) -> None:
+    """By a table of damage alone, a place with a higher level had been taken for the worst."""
+    document = two_fronts(mass_kg).model_dump(mode="json", exclude_none=True)
+    found, points = [screen(Scenario.from_document(document, "fronts"))], np.linspace(5, 55, 26)
+    for x_m in points.tolist():
+        document["charge"] = [builders.point(x_m, 2.0, mass_kg)]
+        found.append(screen(Scenario.from_document(document, "fronts")))
+    assert found[0].threats[0].places == len(points)
+    every = (own.threats[0].bays for own in found)
+    levels = [min(bay.response.level_of_protection for bay in bays) for bays in every]
+    assert levels[0] == min(levels[1:])
 
 
 def test_the_stand_off_that_a_site_needs_is_that_of_its_own_panes_and_storeys() -> None:

@@ -144,6 +144,22 @@ def test_echoes_after_the_load_do_not_throw_a_pane_however_long_the_run_lasts() 
     assert long.glazing.hazard.tolist() == pytest.approx(short.glazing.hazard.tolist())
 
 
+def test_the_worse_of_two_responses_breaks_as_many_panes_as_either() -> None:
+    """A long load breaks fewer tempered panes than a short one, and throws these farther."""
+    bays = [FacadeBay(bay(), glazing("window_tempered_6"))]
+    long, short = (
+        respond(bays, np.array([0.0, 2.0 * 250.0 / peak_pa]), np.array([[peak_pa, 0.0]]))
+        for peak_pa in (15e3, 20e3)
+    )
+    assert short.broken_panes > 2.0 * long.broken_panes
+    assert long.glazing.hazard > short.glazing.hazard
+    assert short.glazing.edge_force_n_m > long.glazing.edge_force_n_m
+    for found in (long.or_worse(short), short.or_worse(long)):
+        assert found.glazing.hazard == long.glazing.hazard
+        assert found.broken_panes == short.broken_panes
+        assert found.glazing.edge_force_n_m == short.glazing.edge_force_n_m
+
+
 def test_windows_and_walls_of_a_building_decide_together() -> None:
     end_s = 2.0 * 200.0 / 28e3  # some 50 kg at 40 m
     time_s, history = np.array([0.0, end_s]), np.array([28e3, 0.0])

@@ -14,6 +14,7 @@ from blast_env.answers.document import (
     left_out_words,
     lines,
     percent,
+    rounded_down,
     without_facade_words,
 )
 from blast_env.evaluation.engines.pieces import outcome_words
@@ -119,7 +120,7 @@ def _masses(study: Study) -> str:
         found = study.protected.under(number)
         kg, is_found = mass_near(found, study.target)
         bound = "at least " if found.passes(study.target) else "less than "
-        mass = Number(kg, "kg TNT").text()
+        mass = Number(rounded_down(kg), "kg TNT").text()
         words.append(f"{threat.name} {'' if is_found else bound}{mass}")
     return (
         f"{', '.join(words)}: with it the level is kept at the same place; blast-env assess "

@@ -214,10 +214,12 @@ class StandOff:
     most_m: float
 
     def in_words(self, distance_m: float) -> str:
-        """Return a distance in words, m, with the limits of validity."""
+        """Return a distance in words, m, rounded up, with the limits of validity."""
         if np.isinf(distance_m):
             return f"> {self.most_m:.0f}"
-        return f"< {self.least_m:.0f}" if distance_m <= self.least_m else f"{distance_m:.0f}"
+        if distance_m <= self.least_m:
+            return f"< {ceil(self.least_m)}"
+        return str(ceil(distance_m))
 
 
 @dataclass(frozen=True)
@@ -408,25 +410,19 @@ class _Curves:
         return np.stack([distances_m, *loads])
 
     def stand_offs_m(self, part: Pane | Panel) -> dict[LevelOfProtection, float]:
-        """Return the least of the distances at which a part allows each level."""
+        """Return the distances from which on a part allows each level."""
         if part not in self._known:
             self._known[part] = self._found_m(part)
         return self._known[part]
 
     def _found_m(self, part: Pane | Panel) -> dict[LevelOfProtection, float]:
         distances_m, *loads = self.reflected
-        # Damage falls with distance, so the first distance that keeps a level is found by
-        # bisection, of all levels at once.
-        most = 5.0 - np.array(_LEVELS)  # damage of a level is less
-        low, high = np.full(len(_LEVELS), -1), np.full(len(_LEVELS), _DISTANCES)
-        while (high - low > 1).any():
-            middle = (low + high) // 2  # fails at `low`, keeps at `high`
-            asked = np.maximum(middle, 0)
-            damage = damage_numbers(under_triangle(part, *(load[asked] for load in loads)))
-            keeps, open_ends = damage < most, high - low > 1
-            high = np.where(open_ends & keeps, middle, high)
-            low = np.where(open_ends & ~keeps, middle, low)
-        reach_m = np.append(distances_m, np.inf)[high]
+        damage = damage_numbers(under_triangle(part, *loads))
+        # Damage does not always fall with distance: longer loads break fewer panes of strong glass,
+        # and throw these farther. What counts is the last distance that fails.
+        fails = damage >= 5.0 - np.array(_LEVELS)[:, np.newaxis]  # damage of a level is less
+        after = _DISTANCES - np.argmax(fails[:, ::-1], axis=1)
+        reach_m = np.append(distances_m, np.inf)[np.where(fails.any(axis=1), after, 0)]
         return dict(zip(_LEVELS, reach_m.tolist(), strict=True))
 
     def reach_m(self, index: int, limit: float) -> float:
@@ -684,7 +680,8 @@ def _screened(
     damage = np.zeros(peaks.shape)
     for kind, own_parts in enumerate(parts):
         which = numbers == kind
-        damage[:, which] = _tabulated(own_parts, peaks[:, which], impulses[:, which])
+        of_parts = [_damage(part, peaks[:, which], impulses[:, which]) for part in own_parts]
+        damage[:, which] = np.max(of_parts, axis=0, initial=0.0)
     order = [(int(other.max()), float(other.sum())) for other in damage]
     worst = max(range(len(places)), key=lambda index: order[index])
     own, in_view = _named(atlas, places[worst]), facade.sees(places[worst])
@@ -729,9 +726,9 @@ def _others(
     glass = np.zeros(len(places))
     if any(isinstance(part, Panel) for own in parts for part in own):
         for kind, own in enumerate(parts):
-            panes, which = [part for part in own if isinstance(part, Pane)], numbers == kind
-            if panes:
-                damage = _tabulated(panes, peaks[:, which], impulses[:, which])
+            which = numbers == kind
+            for pane in (part for part in own if isinstance(part, Pane)):
+                damage = _damage(pane, peaks[:, which], impulses[:, which])
                 glass = np.maximum(glass, damage.max(axis=1))
     measures = {
         "glass": glass,
@@ -759,10 +756,29 @@ def _named(atlas: SiteAtlas | None, place: Charge) -> Surroundings | None:
     return atlas.around((*place.position_m, place.height_m), float(np.cbrt(place.tnt_kg)))
 
 
+def _damage(part: Pane | Panel, peak_pa: FloatArray, impulse_pa_s: FloatArray) -> FloatArray:
+    """Return the damage of a pane or panel under many loads (places, bays).
+
+    It is that of a table, but exact for loads whose level decides and is not that of all of the
+    table's points around them.
+    """
+    damage, least, most = _tabulated(part, peak_pa, impulse_pa_s)
+    # The worst level is at least that of the loads whose level is clear.
+    reached = int(least.max())
+    unclear = (least.astype(int) < most.astype(int)) & (most.astype(int) >= reached)
+    if unclear.any():
+        exact = under_triangle(part, peak_pa[unclear], impulse_pa_s[unclear])
+        damage[unclear] = damage_numbers(exact)
+    return damage
+
+
 def _tabulated(
-    parts: Sequence[Pane | Panel], peak_pa: FloatArray, impulse_pa_s: FloatArray
-) -> FloatArray:
-    """Return the damage of the worst of some parts under many loads, by a table of it."""
+    part: Pane | Panel, peak_pa: FloatArray, impulse_pa_s: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the damage of a pane or panel under many loads, by a table of it.
+
+    The second and the third are the least and the most of the points around each load.
+    """
     axes = [
         np.linspace(own.min(), own.max() + 1e-6, _POINTS)
         for own in (np.log(peak_pa), np.log(impulse_pa_s))
@@ -777,12 +793,11 @@ def _tabulated(
         asked[row + more[0], column + more[1]] = True
     table, places = np.zeros(asked.shape), np.nonzero(asked)
     loads = [np.exp(axis[index]) for axis, index in zip(axes, places, strict=True)]
-    table[places] = np.max([damage_numbers(under_triangle(part, *loads)) for part in parts], axis=0)
-    first, last = (
-        (1.0 - across) * table[own, column] + across * table[own, column + 1]
-        for own in (row, row + 1)
-    )
-    return np.asarray((1.0 - down) * first + down * last)
+    table[places] = damage_numbers(under_triangle(part, *loads))
+    corners = [table[row + more[0], column + more[1]] for more in product((0, 1), repeat=2)]
+    first, last = ((1.0 - across) * low + across * high for low, high in (corners[:2], corners[2:]))
+    damage = np.asarray((1.0 - down) * first + down * last)
+    return damage, np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def _between(axis: FloatArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
