@@ -1,7 +1,7 @@
 """The benchmark problems by name and version."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from hashlib import sha256
@@ -12,9 +12,9 @@ from typing import Final, Literal
 from blast_env.bundled import ITEM_SITES
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.cases import fixed_charges, one_per_charge, search_set
+from blast_env.evaluation.cases import has_few_places, one_per_charge, search_set
 from blast_env.layout.build_site import draw_threat
-from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
+from blast_env.site import AnyCharge, PointSource, Scenario, VehicleCharge, load_scenario
 from blast_env.sites import SITE_KINDS
 from blast_env.values import whole_number
 
@@ -107,15 +107,12 @@ class Definition:
         return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
 
     def _known(self) -> LoadCaseSet:
-        scenario = self.scenario
-        drawn, number = divmod(self.place - 1, len(scenario.charge))
-        seed = SeedRange.TEST.seeds(drawn * _STRIDE, 1)[0]
-        source = scenario.charge[number]
-        alone = scenario.model_copy(update={"charge": (source,)})
-        charge = draw_threat(alone, seed)
-        threats = (LoadCase(charge, seed),)
+        scenario, threat = self.scenario, _known_threat(self.scenario, self.place)
         return LoadCaseSet(
-            scenario, threats, charge=charge, search_set=search_set(scenario, charge)
+            scenario,
+            (threat,),
+            charge=threat.charge,
+            search_set=search_set(scenario, threat.charge),
         )
 
     def _hidden(self) -> LoadCaseSet:
@@ -129,6 +126,29 @@ class Definition:
         drawn = search_set(scenario, None, charges=met)
         drawn = replace(drawn, threats=one_per_charge(drawn.threats))
         return LoadCaseSet(scenario, one_per_charge(threats), search_set=drawn)
+
+
+def _known_threat(scenario: Scenario, place: int) -> LoadCase:
+    """Return the threat with the known charge of a number, as `Definition.place` has it."""
+    drawn, number = divmod(place - 1, len(scenario.charge))
+    seed = SeedRange.TEST.seeds(drawn * _STRIDE, 1)[0]
+    alone = scenario.model_copy(update={"charge": (scenario.charge[number],)})
+    return LoadCase(draw_threat(alone, seed), seed)
+
+
+def _known_places(scenario: Scenario, most: int) -> Iterator[int]:
+    """Yield the numbers of at most `most` known charges, each charge once.
+
+    A point, and a vehicle, has the same charge in every draw: again it is no further evidence.
+    """
+    rounds = 1 if has_few_places(scenario) else most
+    met: dict[AnyCharge, int] = {}
+    for place in range(1, rounds * len(scenario.charge) + 1):
+        if (
+            len(met) < most
+            and met.setdefault(_known_threat(scenario, place).charge, place) == place
+        ):
+            yield place
 
 
 def _charge(threat: LoadCase) -> object:
@@ -172,7 +192,8 @@ def site_problems(
     Args:
         scenario: Bundled name or path, or a kind of generated sites (`SITE_KINDS`), for a
             problem on each of the first sites held out from training.
-        most: Largest number of charges, each a problem, or of sites. Fixed charges count once each.
+        most: Largest number of charges, each a problem, or of sites. A fixed charge counts once,
+            and so does a vehicle, which goes to its worst place.
         is_hidden: Whether one problem has all charges of a site instead.
 
     Raises:
@@ -187,8 +208,8 @@ def site_problems(
     found.scenario.zone  # noqa: B018  # refuses a scenario without one
     if is_hidden:
         return (found if found.scenario.vehicles else Definition(site, "hidden"),)
-    count = min(count, len(fixed_charges(found.scenario)) or count)
-    return tuple(Definition(site, "known", place) for place in range(1, count + 1))
+    places = _known_places(found.scenario, count)
+    return tuple(Definition(site, "known", place) for place in places)
 
 
 @cache

@@ -153,10 +153,14 @@ class SeedRange(Enum):
 
     No blast that influenced the choice of a layout or agent is used to judge it. The seed of a
     threat determines its fan and air and, where the charge is drawn, its charge.
+
+    The seed of a `reset` is of no range. It determines the charges and the seeds of the blasts of
+    an episode, which are of `TRAINING`. The charges are of another stream than a threat's, so that
+    an episode and a threat with the same number have nothing in common.
     """
 
     TRAINING = range(2**31)
-    """Episodes of the environments, and seeds given by users."""
+    """Blasts of episodes, and seeds given by users."""
     TEST = range(2**31, 2**33)
     """Final judgement of layouts and agents: benchmark, evaluation, checks of a search."""
     SEARCH = range(2**33, 2**33 + 2**31)

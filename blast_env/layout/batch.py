@@ -22,9 +22,15 @@ if TYPE_CHECKING:
     from blast_env.vehicles.vehicle import AccessWay
 
 _MOST_ROOMS: Final = 4
-_NOBODY: Final = 3
-"""Number of references to a kept room of observations that nobody has: the list, the name of it in
-the loop, and the argument of the count."""
+
+
+def _references(rooms: Sequence[NDArray[np.float32]]) -> list[int]:
+    """Return how many references each room has, those of the list and of the count included."""
+    return [getrefcount(kept) for kept in rooms]
+
+
+_NOBODY: Final = _references([np.empty(0, dtype=np.float32)])[0]
+"""Number of references to a kept room that nobody has; interpreters count differently."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +274,10 @@ class LayoutBatch:
 
         The pages of new memory take longer than to write the observations.
         """
-        for kept in self._rooms:
-            if kept.shape == shape and getrefcount(kept) == _NOBODY:
+        # An observation is a view. It refers to the room only where that has its own memory, not
+        # where it lies in the bytes of a pickle (protocol 5).
+        for kept, references in zip(self._rooms, _references(self._rooms), strict=True):
+            if kept.shape == shape and references == _NOBODY and kept.base is None:
                 return kept
         made = np.empty(shape, dtype=np.float32)
         self._rooms = [*self._rooms[-_MOST_ROOMS + 1 :], made]

@@ -121,6 +121,15 @@ def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> No
     )
 
 
+def test_weights_whose_layout_hides_a_building_are_never_the_best(finished: Path) -> None:
+    """Its load is no number; at the beginning of a run it stood before all others."""
+    rows = read_evaluations(RunFolder(finished).evaluations)
+    hiding = replace(rows[0], reduction=float("nan"))
+    assert best_of([hiding, *rows]) == best_of(rows)
+    assert best_of([*rows, hiding]) == best_of(rows)
+    assert best_of([hiding]) is hiding
+
+
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
     module = import_module("tensorboard.backend.event_processing.event_accumulator")
     events = module.EventAccumulator(str(finished / "tensorboard"))
@@ -165,6 +174,21 @@ def test_an_interrupted_run_goes_on_from_its_last_checkpoint(
     kept = weights(run / f"rl_model_{ROLLOUT}_steps.zip")
     assert all(torch.equal(kept[name], values) for name, values in before.items())
     assert outcome(finished)[0][0] == replace(result.evaluations[0], seconds=0.0)
+
+
+def test_weights_of_the_last_evaluation_are_kept_if_it_was_there_before(
+    finished: Path, tmp_path: Path
+) -> None:
+    """An evaluation is written before its weights, for which a device may have no more room."""
+    run = RunFolder(Path(copytree(finished, tmp_path / "run")))
+    for path in (run.checkpoint(STEPS), run.last_model):
+        path.unlink()
+    result = resume(run.path)
+    steps = [row.timesteps for row in result.evaluations]
+    assert steps == [ROLLOUT, 2 * ROLLOUT, STEPS, STEPS]
+    assert [*run.checkpoints] == [ROLLOUT, 2 * ROLLOUT, STEPS]
+    last = weights(run.checkpoint(STEPS))
+    assert all(torch.equal(last[name], own) for name, own in weights(run.last_model).items())
 
 
 def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Path) -> None:

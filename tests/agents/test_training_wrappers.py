@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import blast_env  # noqa: F401
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import SeedRange, draw_threats
 from blast_env.sites import SiteSource
 from tests.agents.training_runs import small_scenario
 
@@ -77,6 +78,19 @@ def test_pools_of_other_seeds_are_other_threats_and_the_same_seed_the_same() -> 
     seeds = [ThreatPool(environment(), size=4, seed=seed).seeds for seed in (0, 1, 0)]
     assert seeds[0] == seeds[2]
     assert not set(seeds[0]) & set(seeds[1])
+
+
+def test_no_episode_of_a_pool_is_a_held_out_threat() -> None:
+    """A number of a pool may be that of a test: charges are drawn from another stream."""
+    scenario, env = small_scenario(), ThreatPool(environment(), size=16)
+    held_out = [seed for seed in env.seeds if seed in SeedRange.TEST.value]
+    assert held_out
+    for seed in held_out:
+        env.env.reset(seed=seed)
+        *_, info = env.step(env.get_wrapper_attr("finish"))
+        assert info["charges"][0] != draw_threats(scenario, [seed])[0].charge
+        drawn = np.ravel(info["blast_seeds"]).tolist()
+        assert all(blast in SeedRange.TRAINING.value for blast in drawn)
 
 
 def test_the_seed_of_a_reset_decides_the_episodes_that_follow() -> None:

@@ -253,6 +253,17 @@ def test_charges_on_a_line_are_drawn_at_different_places() -> None:
     assert len({site_problem.case.threats[0].seed for site_problem in found}) == 3
 
 
+@pytest.mark.parametrize(
+    ("site", "problems"),
+    [("hotel_forecourt", 1), ("government_forecourt", 2), ("perimeter_gate", 7)],
+)
+def test_a_charge_is_one_problem_however_often_it_is_drawn(site: str, problems: int) -> None:
+    """The same problem again would narrow the interval over the problems by no evidence."""
+    found = site_problems(site, 7)
+    assert len(found) == problems
+    assert len({site_problem.case.charge for site_problem in found}) == problems
+
+
 def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
     tmp_path: Path,
 ) -> None:

@@ -211,3 +211,28 @@ def test_a_copy_in_mid_episode_goes_on_identically(again: Any, observation: str)
         assert same(env.step(action), twin.step(action))
     assert same(env.reset(), twin.reset())
     assert same(env.step(FINISH), twin.step(FINISH))
+
+
+@pytest.mark.usefixtures("drawn")
+@pytest.mark.parametrize(
+    "again",
+    [
+        lambda env: env,
+        copy.deepcopy,
+        lambda env: pickle.loads(pickle.dumps(env, protocol=4)),
+        lambda env: pickle.loads(pickle.dumps(env, protocol=5)),  # as cloudpickle and Python 3.14
+    ],
+)
+def test_observations_that_somebody_keeps_stay_as_they_are(again: Any) -> None:
+    """The memory of those that nobody has any more is used again."""
+    env = make(observation="features")
+    env.reset(seed=2)
+    env.step(11)
+    twin = again(env)
+    kept: list[Any] = []
+    said: list[Any] = []
+    for action in (12, 13):
+        kept.append(twin.step(action)[0])
+        said.append(kept[-1].copy())
+    assert not same(*kept)
+    assert same(kept, said)

@@ -12,6 +12,7 @@ from typing import Any, Final
 import gymnasium as gym
 import numpy as np
 import pytest
+from blast_agents.training.imitation import best_by_rule
 from typer.testing import CliRunner
 
 from blast_env.answers import Document, Line, Table, assess, compare
@@ -27,7 +28,14 @@ from blast_env.design.search import (
 )
 from blast_env.design.search.advised import site_with_target
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_layout
+from blast_env.evaluation import (
+    BlastEvaluator,
+    BlastStore,
+    Evaluators,
+    LoadCase,
+    LoadCaseSet,
+    evaluate_layout,
+)
 from blast_env.evaluation.blasts import Blasts
 from blast_env.evaluation.campaign import Campaign
 from blast_env.evaluation.engines.gas import GasEngine
@@ -41,6 +49,7 @@ from blast_env.evaluation.questions.verdict import (
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import write_layout
 from blast_env.response import LevelOfProtection
+from blast_env.rules import layouts_by_rule
 from blast_env.site import Charge, Scenario, save_scenario
 from tests import builders
 from tests.builders import block, point
@@ -322,3 +331,12 @@ def test_the_benchmark_counts_a_layout_that_hides_a_building_as_nothing(cache: P
     problem.evaluate(WALLS[:1])
     assert problem.best is not None
     assert np.isfinite(problem.best.share)
+
+
+def test_no_policy_is_shown_a_layout_that_hides_a_building(cache: Path) -> None:
+    """The best one had been the first without a number, before any that helps; none does here."""
+    scenario = site("other")
+    evaluators = Evaluators(ENGINE, BlastStore(cache))
+    case = LoadCaseSet(scenario, (LoadCase(CHARGE),), charge=CHARGE)
+    assert layouts_by_rule(scenario, CHARGE)["wall near the charge"] == WALLS
+    assert best_by_rule(evaluators, [case]) == [((), 0.0)]

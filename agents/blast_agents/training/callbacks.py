@@ -59,6 +59,7 @@ class ValidationCallback(BaseCallback):
         self._rollouts, self._began_s = 0, began_s
         self._episodes, self._blasts, self._seconds = 0, blasts, 0.0
         self._counts: dict[int, tuple[int, int]] = {}
+        self._recorded_at = -1  # of this training: rows may be of one that was interrupted
 
     def _on_training_start(self) -> None:
         before = [row for row in self.rows if row.timesteps <= self.num_timesteps]
@@ -89,7 +90,7 @@ class ValidationCallback(BaseCallback):
         self.logger.record("blasts/cache_hits", sum(hits for _, hits in self._counts.values()))
 
     def _on_training_end(self) -> None:
-        if not self.rows or self.rows[-1].timesteps != self.num_timesteps:
+        if self._recorded_at != self.num_timesteps:
             self._record()
         write_model(self.model, self.folder.last_model)
 
@@ -113,11 +114,11 @@ class ValidationCallback(BaseCallback):
             self._seconds + perf_counter() - self._began_s,
             json.dumps(self.settings.judging),
         )
-        best = best_of(self.rows)
-        if best is None or row.reduction > best.reduction:
-            write_model(self.model, self.folder.best_model)
         self.rows.append(row)
+        if best_of(self.rows) is row:
+            write_model(self.model, self.folder.best_model)
         write_evaluations(self.folder.evaluations, self.rows)
         write_model(self.model, self.folder.checkpoint(self.num_timesteps))
+        self._recorded_at = self.num_timesteps
         self.logger.record("eval/reduction", row.reduction)
         self.logger.dump(self.num_timesteps)

@@ -54,9 +54,10 @@ class _Pool:
 class ThreatPool(_MaskWrapper):
     """Draws the episodes, with their sites and charges, from a fixed set.
 
-    The blasts without a barrier then recur and are cached, so that an episode costs half the
-    blasts. By default an environment caches a thousand loads for each of four sites; a `cache`
-    raises both limits.
+    Its numbers of 32 bits are seeds of `reset`, which no held-out threat shares (`SeedRange`). The
+    blasts without a barrier recur and are cached, so that an episode costs half the blasts. By
+    default an environment caches a thousand loads for each of four sites; a `cache` raises both
+    limits.
 
     Args:
         env: A `BlastBarrier` environment.

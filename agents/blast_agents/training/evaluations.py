@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from io import BytesIO
+from math import inf, isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,8 +69,11 @@ _ROWS: Final = TypeAdapter(list[EvaluationRow])
 
 
 def best_of(rows: Sequence[EvaluationRow]) -> EvaluationRow | None:
-    """Return the evaluation with the largest reduction, the first of equal ones."""
-    return max(rows, key=lambda row: row.reduction, default=None)
+    """Return the evaluation with the largest reduction, the first of equal ones.
+
+    A reduction that is no number, where a layout hides a building, is less than any other.
+    """
+    return max(rows, key=lambda row: -inf if isnan(row.reduction) else row.reduction, default=None)
 
 
 def write_evaluations(path: Path, rows: Sequence[EvaluationRow]) -> None:
@@ -241,16 +245,17 @@ def _draw_held_out(axes: Axes, rows: Sequence[EvaluationRow]) -> None:
         capsize=3,
         label="held-out threats: proposed layouts, 95 % interval",
     )
-    best = int(np.argmax(value))
+    best = best_of(rows)
+    assert best is not None
     axes.plot(
-        blasts[best],
-        value[best],
+        best.blasts,
+        best.reduction,
         color=_BEST,
         marker="o",
         markersize=12,
         fillstyle="none",
         ls="",
-        label=f"best weights: {100.0 * value[best]:.1f} %",
+        label=f"best weights: {100.0 * best.reduction:.1f} %",
     )
     axes.set_ylabel("reduction of the load that counts")
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))

@@ -182,7 +182,8 @@ def best_by_rule(
 ) -> list[tuple[Layout, float]]:
     """Return the best layout by rule of each case, sorted, with its relative reduction.
 
-    It is empty, with the reduction 0, if no rule has a layout that is better than no barrier.
+    It is empty, with the reduction 0, if no rule has a layout that is better than no barrier. One
+    that hides a building, whose load is no number, is the worst.
 
     Args:
         evaluators: Run the blasts.
@@ -207,7 +208,7 @@ def best_by_rule(
             case.objective_value(of_layout, layout)
             for of_layout, layout in zip(of_layouts.reshape(len(layouts), -1), layouts, strict=True)
         ]
-        best = int(np.argmin(values))
+        best = int(np.argmin(np.where(np.isnan(values), np.inf, values)))
         # If nothing arrives without a barrier, no layout reduces it.
         share = float(np.nan_to_num(reductions(values[best], values[0])))
         found.append((layouts[best], share))
