@@ -11,6 +11,7 @@ from blast_env.answers.assess import governing, response_table
 from blast_env.answers.document import TYPOGRAPHIC, percent, worse
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
+    Estimate,
     Evaluators,
     LoadCase,
     LoadCaseSet,
@@ -25,7 +26,7 @@ from blast_env.evaluation.engines import choosing_engine, final_engine, find_eng
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.questions.verdict import consequences_by_layout
 from blast_env.site import Charge, load_scenario
-from blast_env.statistics import Estimate, reductions
+from blast_env.statistics import reductions
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.scenarios import BALLISTIC_COURTYARD
 

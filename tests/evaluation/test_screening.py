@@ -11,8 +11,7 @@ from blast_env.atlas import Laws, SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.questions.screening import Screening, StandOff, screen, stand_offs
-from blast_env.layout import load_layout
-from blast_env.layout.build_site import build_site
+from blast_env.layout import build_site, load_layout
 from blast_env.response import (
     Bay,
     FacadeBay,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import t as student_t
 
 from blast_env.errors import BlastEnvError
-from blast_env.statistics import (
+from blast_env.evaluation import (
     Estimate,
     conditional_value_at_risk,
     mean_estimate,

@@ -7,8 +7,7 @@ from typing import Any, Final
 import gymnasium as gym
 
 import blast_env  # noqa: F401  # registers the environments
-from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
-from blast_env.sites import FAMILIES, SiteSource
+from blast_env.sites import FAMILIES, ITEM_SITES, LARGE_SITES, SITES, SiteSource
 from tests.agents.training_runs import small_scenario as sparse_site
 from tests.envs.small import ThinEngine
 from tests.gas_sites import hut

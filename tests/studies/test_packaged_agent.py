@@ -7,7 +7,8 @@ from blast_agents import PackagedAgent, packaged_agent
 from blast_agents.packaged import CandidateNetwork, load_packaged
 from typer.testing import CliRunner
 
-from blast_env.design.search.learnt import Guesses, case_for
+from blast_env.design.search import Guesses
+from blast_env.design.search.learnt import case_for
 from blast_env.surrogate import packaged_surrogate
 from studies.packaged_agent import app, read_shown, shown_cases
 from studies.packaged_training import charge_of, reinforced

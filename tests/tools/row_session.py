@@ -5,7 +5,7 @@ from threading import Event
 from typing import Any
 
 from blast_env.benchmark import ReferenceLayout, ScoreReference
-from blast_env.evaluation.record import BlastLoads
+from blast_env.evaluation.engines import BlastLoads
 from blast_env.geometry import Piece
 from blast_env.tools import Session, call_tool
 from blast_env.tools.records import Answer

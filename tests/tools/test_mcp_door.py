@@ -16,9 +16,9 @@ import mcp
 from mcp.client.stdio import StdioServerParameters
 from mcp.client.streamable_http import streamable_http_client
 
-from blast_env.tools import TOOLS, Episode, Sessions
+from blast_env.tools import TOOLS, Episode, Sessions, played_in
 from blast_env.tools.mcp_door import mcp_server
-from blast_env.tools.scripts import played_in, rules_guesses_blasts
+from blast_env.tools.scripts import rules_guesses_blasts
 from blast_env.tools.sessions import MOST_SESSIONS
 from tests.tools.row_session import BEST, HeldEngine, session, walls
 from tests.tools.serving import ENVIRONMENT, served

@@ -15,9 +15,9 @@ openenv = pytest.importorskip("openenv", reason="needs the extra openenv: `make 
 from openenv import GenericEnvClient  # noqa: E402
 
 from blast_env.provenance import package_version  # noqa: E402
-from blast_env.tools import TOOLS, Tasks  # noqa: E402
+from blast_env.tools import TOOLS, Tasks, played, played_in  # noqa: E402
 from blast_env.tools.openenv_door import ToolCall, ToolEnvironment  # noqa: E402
-from blast_env.tools.scripts import played, played_in, rules_guesses_blasts  # noqa: E402
+from blast_env.tools.scripts import rules_guesses_blasts  # noqa: E402
 from tests.tools.row_session import BEST, session, walls  # noqa: E402
 from tests.tools.serving import served  # noqa: E402
 

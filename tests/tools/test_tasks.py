@@ -4,8 +4,7 @@ import pytest
 
 from blast_env.benchmark import DEFINITIONS, Definition
 from blast_env.errors import BlastEnvError
-from blast_env.tools import Episodes, Session, TaskLists, Tasks
-from blast_env.tools.records import BUDGET
+from blast_env.tools import BUDGET, Episodes, Session, TaskLists, Tasks
 from tests.tools.row_session import BEST, session, walls
 
 SECRET = "correct horse"

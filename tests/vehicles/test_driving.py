@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutState, vehicle_drive, worst_places
 from blast_env.rules import line_of_posts
-from blast_env.sections import Site
-from blast_env.site import Scenario, ScenarioError, VehicleSource, loaded_walls
+from blast_env.site import Scenario, ScenarioError, Site, VehicleSource, loaded_walls
 from blast_env.vehicles import (
     KM_H_PER_M_S,
     STEP_M,

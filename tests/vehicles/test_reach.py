@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState, charge_against, vehicle_reach, worst_places
-from blast_env.sections import Site
-from blast_env.site import AnyCharge, Charge, VehicleCharge, VehicleSource, ranked
+from blast_env.site import AnyCharge, Charge, Site, VehicleCharge, VehicleSource, ranked
 from blast_env.vehicles import Entry, Obstacles, Reach, VehicleGround
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 

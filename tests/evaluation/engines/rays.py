@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blast_env.evaluation.record import BlastLoads, StructureLoad
+from blast_env.evaluation.engines import BlastLoads, StructureLoad
 from blast_env.geometry import Element
 from blast_env.layout import charge_against
 from blast_env.site import AnyCharge, Scenario
