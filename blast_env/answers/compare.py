@@ -194,6 +194,11 @@ def _flags(found: Consequences, name: str) -> tuple[str, ...]:
     flags = [why for building, why in found.unchecked if building == name]
     flags += [walls.words for walls in found.unjudged if walls.building == name]
     flags += [words for building, words in found.unloaded if building == name]
+    # Thin interlayers, oblique walls, and impulses not captured; doubtful loads once.
+    own = Consequences(found.of(name))
+    doubts = () if flags else own.notes
+    others = replace(own, responses=tuple(replace(part, site=None) for part in own.responses)).notes
+    flags += [note.removeprefix(f"{name}: ") for note in doubts or others]
     return tuple(flags)
 
 

@@ -2,12 +2,16 @@
 
 import pytest
 
+from blast_env.answers.compare import building_verdicts
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.engines.gas_validation import validation_of
+from blast_env.evaluation.questions.limits import Limit, LoadLimit, SiteVerdict
 from blast_env.evaluation.questions.verdict import Consequences, bay_table
-from blast_env.evaluation.validation import NOT_KNOWN, ValidationStatus
+from blast_env.evaluation.record import BuildingLoad
+from blast_env.evaluation.validation import NOT_KNOWN, Validation, ValidationStatus
 from blast_env.geometry import Layout
+from blast_env.response import Glazing, Interlayer, LevelOfProtection, catalogue
 from blast_env.site import Charge
 from tests.blasts import consequences
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
@@ -143,3 +147,34 @@ def test_reports_flag_every_building(engine: GasEngine, known: bool) -> None:
 def test_gauges_that_are_cut_off_are_flagged(until: str | float, late: list[str]) -> None:
     found = GasBlast(hut(), engine=GasEngine(border_m=0.0, until=until)).run()
     assert found.gauge_notes == tuple(f"gauge {name}: {NOT_KNOWN}" for name in late)
+
+
+def test_a_limit_is_flagged_where_its_load_is_approximate() -> None:
+    """As a charge above the ground: of bays that flags a verdict, of limits it did not."""
+    words = {}
+    for status in ValidationStatus:
+        load = BuildingLoad(
+            *(100.0, 5e3, 5e3, "gas", 0.01, "west", 120.0, 0.02),
+            known=True,
+            flagged=False,
+            validation=Validation(status, "why"),
+        )
+        limited = LoadLimit(Limit("hut", 200.0), "T1", load)
+        verdict = SiteVerdict(Consequences(()), LevelOfProtection.LOW, (limited,))
+        words[status.label] = limited.word, verdict.word
+    plain, flagged = ("complies", "COMPLIES"), ("complies (flagged)", "COMPLIES (flagged)")
+    doubtful = {"approximate", "outside"}
+    assert words == {label: flagged if label in doubtful else plain for label in words}
+
+
+def test_the_table_of_buildings_has_the_flags_of_a_verdict() -> None:
+    """That of thin interlayers stood beside the verdicts of commands alone."""
+    laminated = catalogue()["window_laminated_6"]
+    assert isinstance(laminated, Glazing)
+    thin = laminated.model_copy(update={"interlayer": Interlayer(thickness_mm=0.76)})
+    whole = judged(WHOLE)
+    said = [
+        any("interlayers under" in flag for own in building_verdicts(found) for flag in own.flags)
+        for found in (whole, whole.with_glazing(thin))
+    ]
+    assert said == [False, True]

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.questions.verdict import Consequences, Verdict
 from blast_env.evaluation.record import BuildingLoad
+from blast_env.evaluation.validation import ValidationStatus
 from blast_env.response.levels import LevelOfProtection
 from blast_env.units import PA_PER_KPA
 from blast_env.values import count_of, plain_number
@@ -83,9 +84,15 @@ class LoadLimit(NamedTuple):
         return self.limit.is_kept(self.load)
 
     @property
+    def is_flagged(self) -> bool:
+        """Whether there is a note on the load, or it is approximate or outside."""
+        status = self.load.validation.status
+        return self.load.flagged or status >= ValidationStatus.APPROXIMATE
+
+    @property
     def word(self) -> str:
         """The verdict in a word."""
-        return Verdict.of(self.is_kept).word(self.load.flagged).lower()
+        return Verdict.of(self.is_kept).word(self.is_flagged).lower()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +121,7 @@ class SiteVerdict:
     @property
     def is_flagged(self) -> bool:
         """Whether a load behind the verdict has a note."""
-        return self.found.is_flagged or any(own.load.flagged for own in self.limited)
+        return self.found.is_flagged or any(own.is_flagged for own in self.limited)
 
     @property
     def word(self) -> str:
