@@ -71,8 +71,9 @@ class TriangularLoads:
     """
 
     def __init__(self, bays: Sequence[Alternatives]) -> None:
-        self._bays = [(_kind(bay), bay, _areas(bay)) for bay in bays]
-        self._found: dict[tuple[_Kind, float, float], dict[str, float]] = {}
+        kinds: dict[object, int] = {}  # bays that respond alike have one number
+        self._bays = [(kinds.setdefault(_kind(bay), len(kinds)), bay, _areas(bay)) for bay in bays]
+        self._found: dict[tuple[int, float, float], dict[str, float]] = {}
 
     def damages(
         self,
@@ -159,13 +160,13 @@ def damage_numbers(found: GlazingResponses | PanelResponses) -> FloatArray:
     return found.damage if isinstance(found, PanelResponses) else found.hazard
 
 
-_Kind = tuple[object, ...]
-"""The properties that determine a bay's response, besides the load."""
-
-
-def _kind(bay: Alternatives) -> _Kind:
+def _kind(bay: Alternatives) -> tuple[object, ...]:
+    """Return what determines the response of a bay, besides the load."""
     height_m = next(iter((*bay.glazing.values(), *bay.wall.values()))).bay.height_m
-    return round(height_m, 6), *bay.glazing, None, *bay.wall
+    # Panes of one name may have the sizes of several facades.
+    panes = ((name, filled.glazing) for name, filled in bay.glazing.items())
+    panels = ((name, filled.wall) for name, filled in bay.wall.items())
+    return round(height_m, 6), *panes, None, *panels
 
 
 def _areas(bay: Alternatives) -> tuple[float, float]:

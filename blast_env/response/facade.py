@@ -7,7 +7,7 @@ over the bay; all its components share that history.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cbrt, inf
+from math import cbrt, ceil, inf
 from typing import Final
 
 import numpy as np
@@ -27,7 +27,7 @@ from blast_env.response.sdof import check_histories, impulses
 from blast_env.response.wall_sections import DamageLevel
 from blast_env.response.walls import PanelResponses, panel_of, panel_responses
 
-_FINER = 4  # refinement of the times of sharpened histories
+_FINER = 4  # least refinement of the times of sharpened histories
 
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
 """Cells per m/kg^(1/3) at which peaks are about half of Kingery and Bulmash's."""
@@ -300,7 +300,8 @@ def rescaled(
     """
     # (1) Finer times, since a compressed history has its points closer together; (2) longer ones
     # for stretched histories; (3) each history about its own arrival.
-    steps = np.arange(_FINER * (len(time_s) - 1) + 1) / _FINER
+    finer = max(_FINER, ceil(1.0 / float(durations.min(initial=1.0))))
+    steps = np.arange(finer * (len(time_s) - 1) + 1) / finer
     times_s = np.interp(steps, np.arange(len(time_s)), time_s)
     if (longest := float(durations.max(initial=1.0))) > 1.0:
         times_s = time_s[0] + longest * (times_s - time_s[0])

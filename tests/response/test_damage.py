@@ -1,5 +1,7 @@
 """Damage of bays, houses and people: curves at points, limits, levels of protection."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -77,6 +79,19 @@ def test_each_component_of_a_bay_gets_its_own_damage() -> None:
     assert (found.area_m2, found.glazed_m2) == pytest.approx((10.5, 2 * 1.2 * 1.5))
     time_s = np.array([0.0, 0.012, 0.024])
     assert bay_damages([bay], time_s, np.array([[30e3, 0.0, 0.0]])) == (found,)
+
+
+def test_bays_with_panes_of_one_name_respond_by_their_own_sizes() -> None:
+    """Those of the second facade had the damage of the first one's panes."""
+    small = alternatives("window_annealed_6")
+    ((name, own),) = small.glazing.items()
+    assert own.glazing is not None
+    wide = replace(own, glazing=own.glazing.model_copy(update={"width_m": 2.4}))
+    large = replace(small, glazing={name: wide})
+    alone = [TriangularLoads([bay]).damages(6e3, 60.0)[0].damage for bay in (small, large)]
+    assert alone[0] != alone[1]
+    together = TriangularLoads([small, large]).damages(6e3, 60.0)
+    assert [found.damage for found in together] == alone
 
 
 # --- Houses and people: the Green Book's curves at points, their limits, and levels of protection.

@@ -101,6 +101,18 @@ def test_sharper_histories_keep_their_impulse(factor: float, lasts_s: float) -> 
     assert sharper.max() == pytest.approx(factor * history.max(), rel=0.15)
 
 
+@pytest.mark.parametrize("factor", [5.65, 8.0, 11.0])
+def test_a_much_sharper_peak_is_not_lost_between_times(factor: float) -> None:
+    """Small charges on large cells: peaks were up to 12 % too low, impulses 2 %."""
+    time_s = np.linspace(0.0, 0.03, 121)
+    push = np.where(time_s >= 0.005, np.maximum(1e5 * (1.0 - (time_s - 0.005) / 0.004), 0.0), 0.0)
+    history = np.convolve(push, [1 / 3, 1 / 3, 1 / 3], "same")
+    times_s, (sharper,) = peak_corrected(time_s, history[np.newaxis], factor)
+    assert sharper.max() == pytest.approx(factor * history.max(), rel=0.02)
+    impulse = np.trapezoid(history, time_s)
+    assert np.trapezoid(sharper, times_s) == pytest.approx(impulse, rel=0.002)
+
+
 def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
     """It holds a block wall that would fall, and throws a light one outwards after a short push."""
     bays = [FacadeBay(bay(), wall=wall(name)) for name in ("block_190", "timber_frame")]
