@@ -35,7 +35,8 @@ def advice_answer(found: AdviceResult) -> Iterator[AnyPart]:
     judge, best = found.judge, found.best
     scenario, target = judge.scenario, judge.target
     yield Line.of(_first_line(found, best), kind="answer")
-    left_out = left_out_words(scenario, [threat.charge for threat in judge.problem.threats])
+    charges = [threat.charge for threat in judge.problem.threats]
+    left_out = left_out_words(scenario, charges, best.layout)
     notes = *left_out, *without_facade_words(scenario), *judge.judged[best.layout].notes
     yield from lines((f"flag: {note}" for note in notes), "flag")
     error = judge.error(best.layout)

@@ -136,7 +136,11 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
         status = judged.validation(building).words
         yield Line.of(f"validation of the load that decides, {building}: {status}")
     own = [threat.charge for threat in blasts.threats]
-    left_out = *left_out_words(blasts.scenario, own), *without_facade_words(blasts.scenario)
+    layout = blasts.layouts[blasts.judged]
+    left_out = (
+        *left_out_words(blasts.scenario, own, layout),
+        *without_facade_words(blasts.scenario),
+    )
     yield from lines((f"flag: {note}" for note in (*left_out, *judged.notes)), "flag")
     notes = _engine_notes(blasts, blasts.judged, judged.notes)
     yield from lines((f"note: {note}" for note in notes), "flag")

@@ -10,7 +10,11 @@ from dataclasses import dataclass, replace
 from math import floor, isfinite, isnan, log10, nan
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 
+import numpy as np
+
 from blast_env.evaluation.cases import fixed_charges
+from blast_env.geometry import Element
+from blast_env.layout.build_site import vehicle_drive, worst_places
 from blast_env.site import (
     AnyCharge,
     AnySource,
@@ -20,9 +24,10 @@ from blast_env.site import (
     VehicleSource,
 )
 from blast_env.site.blast_site import Charge
-from blast_env.site.structures import without_facade
+from blast_env.site.structures import buildings_of, loaded_walls, without_facade
 from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
+from blast_env.vehicles.worst_places import least_distances_m
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
@@ -326,13 +331,25 @@ def height_words(height_m: float) -> str:
     return f", {height_m:g} m high" if height_m else ""
 
 
-def left_out_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
+def left_out_words(
+    scenario: Scenario, charges: Iterable[AnyCharge], layout: Sequence[Element] = ()
+) -> Iterator[str]:
     """Yield that some of the charges of a site are not among those of an answer.
 
-    They are fixed charges, or those of a source of which no charge was drawn. Nothing is said of
-    charges at other places or of other masses, which the user gave.
+    They are fixed charges, or those of a source of which no charge was drawn, and places of a
+    vehicle that are nearer to one of several buildings. Nothing is said of charges at other places
+    or of other masses, which the user gave.
+
+    Args:
+        layout: The layout in question, which vehicles have to pass.
     """
     own = [*charges]
+    vehicles: dict[VehicleSource, list[int]] = {}
+    for driven in own:
+        if isinstance(driven, VehicleCharge):
+            vehicles.setdefault(driven.source, []).append(driven.rank)
+    for source, ranks in vehicles.items():
+        yield from _nearer_words(scenario, source, ranks, layout)
     fixed = fixed_charges(scenario)
     if fixed:
         counted = {charge for charge in own if isinstance(charge, Charge)}
@@ -365,6 +382,31 @@ def _is_of(source: AnySource, charge: AnyCharge) -> bool:
         return isinstance(charge, VehicleCharge) and charge.source == source
     mass = charge.tnt_kg, charge.height_m
     return mass == (source.tnt_kg, source.height_m) and source.has_place(charge.position_m)
+
+
+def _nearer_words(
+    scenario: Scenario, source: VehicleSource, ranks: Iterable[int], layout: Sequence[Element]
+) -> Iterator[str]:
+    """Yield how near a vehicle comes to a building, if its places are farther from it.
+
+    They are those nearest to any assessed wall, which may all be before one of several buildings.
+    """
+    reach_m = vehicle_drive(scenario, source, layout).places_m
+    worst = worst_places(scenario, source, layout)
+    here_m = np.array([worst.place_m(rank) for rank in ranks])
+    for name, parts in buildings_of(scenario.structures_with(layout)).items():
+        walls = loaded_walls(parts)
+        if not walls or not len(reach_m):
+            continue
+        away_m = least_distances_m(walls, reach_m)
+        least_m = float(least_distances_m(walls, here_m).min())
+        if least_m > away_m.min() + source.least_apart_m:
+            x_m, y_m = reach_m[away_m.argmin()].tolist()
+            yield (
+                f"not among these: the nearest place of a vehicle with {source.tnt_kg:g} kg to"
+                f" {name}, {away_m.min():.1f} m away at ({x_m:g}, {y_m:g}) m; its places here are"
+                f" {least_m:.1f} m away or more"
+            )
 
 
 def without_facade_words(scenario: Scenario, limited: Collection[str] = ()) -> Iterator[str]:

@@ -68,7 +68,7 @@ def evaluation_answer(found: Evaluation, seeds: Sequence[int]) -> Iterator[AnyPa
 def sampling_notes(found: Evaluation) -> Iterator[str]:
     """Yield which charges of the site count in the means, and how."""
     scenario, charges = found.scenario, [threat.charge for threat in found.threats]
-    yield from left_out_words(scenario, charges)
+    yield from left_out_words(scenario, charges, found.layout)
     sources, fixed = scenario.charge, len(fixed_charges(scenario))
     if fixed > 1 and are_all(scenario, charges):
         weighted = len({source.weight for source in sources}) > 1

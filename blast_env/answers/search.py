@@ -78,7 +78,7 @@ def search_answer(run: SearchRun, checked: Evaluation | None) -> Iterator[AnyPar
     charges = [threat.charge for threat in problem.threats]
     if len({*charges}) == 1 and isinstance(charges[0], Charge):
         yield Line.of(f"the charge of the search: {charge_text(charges[0])}")
-    left_out = left_out_words(problem.scenario, charges)
+    left_out = left_out_words(problem.scenario, charges, result.layout)
     yield from lines((f"note: {words}" for words in left_out), "flag")
     if result.by and not result.layout:
         yield Line.of(f"nothing is placed: {result.by}")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from blast_env.answers import Line
+from blast_env.answers.document import left_out_words
 from blast_env.answers.screening import screening_answer
 from blast_env.atlas import Laws, SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
@@ -25,9 +26,17 @@ from blast_env.response import (
     respond,
     under_triangle,
 )
-from blast_env.site import Charge, MassPreset, Scenario, load_scenario, tnt_equivalent_kg
+from blast_env.site import (
+    Charge,
+    MassPreset,
+    Scenario,
+    VehicleCharge,
+    load_scenario,
+    tnt_equivalent_kg,
+)
 from tests import builders
 from tests.gas_sites import hut, site_document
+from tests.vehicle_sites import gate_site, vehicle_of
 
 LOW = Requirement.parsed("low")
 BEST = Path(__file__).parents[2] / "docs" / "data" / "best_found" / "control_room.json"
@@ -309,6 +318,31 @@ def test_a_requirement_is_kept_only_if_no_place_of_the_charge_breaks_it(
     parts = screening_answer(street, (), screen(street), [required])
     lines = [part.text() for part in parts if isinstance(part, Line)]
     assert any(f"{required.words} fails with the charge at (" in line for line in lines)
+
+
+def test_a_vehicle_is_screened_where_it_is_nearest_to_each_wall_and_that_is_named() -> (
+    None
+):
+    vehicle = {
+        "kind": "vehicle",
+        "entries": [{"start_m": [0.0, 2.0], "end_m": [0.0, 8.0]}],
+        "width_m": 2.0,
+        "tnt_kg": 20.0,
+        "drivable": [{"corner_m": [0.0, 0.0], "size_m": [140.0, 10.0]}],
+    }
+    keys = {"height_m": 4.0, "protected": True}
+    near = builders.block("bunker", 20.0, 13.0, 20, 20, facade={"wall": "concrete_200"}, **keys)
+    glass = {"glazing": "window_annealed_6"}
+    far = builders.block("glass", 100.0, 20.0, 20, 20, facade=glass, **keys)
+    forecourt = builders.site("forecourt", (140.0, 60.0, 12.0), vehicle, near, far)
+    (found,) = screen(forecourt).threats
+    alone = builders.point(105.0, 9.0, 20.0)
+    (there,) = screen(builders.site("there", (140.0, 60.0, 12.0), alone, near, far)).threats
+    assert found.words[:2] == there.words[:2] == ("below standards", "24.0 of 24")
+    charges = [VehicleCharge(vehicle_of(forecourt), rank) for rank in range(4)]
+    (words,) = left_out_words(forecourt, charges)
+    assert "to glass, 11.0 m away at (100, 9) m; its places here are 73.8 m away or more" in words
+    assert not [*left_out_words(gate_site(), [VehicleCharge(vehicle_of(gate_site()), 0)])]
 
 
 def test_requirements_name_one_scale() -> None:

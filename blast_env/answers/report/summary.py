@@ -75,7 +75,7 @@ def _verdict(study: Study) -> Iterator[AnyPart]:
         limited = [own.limit.building for own in behind.limited]
         yield from lines(without_facade_words(study.scenario, limited), "flag")
         charges = [threat.charge for threat in study.threats]
-        yield from lines(left_out_words(study.scenario, charges), "flag")
+        yield from lines(left_out_words(study.scenario, charges, study.layout), "flag")
     if behind.doubt:
         yield Line.of(f"Cells clip peaks: {behind.doubt}.")
     if behind.found.buildings:

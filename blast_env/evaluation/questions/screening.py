@@ -28,7 +28,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas_validation import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
-from blast_env.layout.build_site import build_site, worst_places
+from blast_env.layout.build_site import build_site, vehicle_drive, worst_places
 from blast_env.response.components import FacadeBay, Glazing, Wall, catalogue
 from blast_env.response.damage import damage_numbers, triangle, under_triangle
 from blast_env.response.facade import FacadeResponse, assumption_words, respond, response_words
@@ -516,6 +516,13 @@ class _Facade:
             found.append(Ways.between(charge_m, self.middles_m, self.outward, seen))
         return Ways(*(np.stack(own) for own in zip(*found, strict=True)))
 
+    def nearest_of(self, places_m: FloatArray) -> FloatArray:
+        """Return the places (places, 2) that are nearest to each bay (bays, 2)."""
+        ways_m = (
+            np.hypot(*(places_m - middle_m).T) for middle_m in self.middles_m[:, np.newaxis, :2]
+        )
+        return places_m[[int(way_m.argmin()) for way_m in ways_m]]
+
     def sees(self, place: Charge) -> BoolArray:
         """Return whether each bay is in sight of a place (bays,).
 
@@ -607,14 +614,16 @@ def _places(
 ) -> Iterator[Charge]:
     """Yield the places of a threat, at most `_APART_M` apart if they are not too many.
 
-    Where they are farther apart, those nearest to each wall are among them.
+    Where they are farther apart, and of vehicles, those nearest to each wall are among them.
     """
     lengths_m = [hypot(*(b - a for a, b in zip(*_span(own), strict=True))) for own in sources]
     apart_m = max(_APART_M, sum(lengths_m) / _MOST_PLACES)
     for source, length_m in zip(sources, lengths_m, strict=True):
         points: Iterable[PointM]
         if isinstance(source, VehicleSource):
-            points = worst_places(scenario, source, layout).places_m
+            reach_m = vehicle_drive(scenario, source, layout).places_m
+            near_m = _before_each_wall(facade, facade.nearest_of(reach_m)) if len(reach_m) else []
+            points = dict.fromkeys((*worst_places(scenario, source, layout).places_m, *near_m))
         elif isinstance(source, RectangleSource):
             is_coarse = max(source.size_m) > _MOST_STEPS * _APART_M
             points = _grid(source, apart_m) + (_nearest(source, facade) if is_coarse else [])
@@ -628,7 +637,11 @@ def _places(
 
 def _nearest(source: PlaceSource, facade: _Facade) -> list[PointM]:
     """Return the place of a source nearest to each wall, before its middle if there are several."""
-    places_m = source.nearest_m(facade.middles_m[:, :2])
+    return _before_each_wall(facade, source.nearest_m(facade.middles_m[:, :2]))
+
+
+def _before_each_wall(facade: _Facade, places_m: FloatArray) -> list[PointM]:
+    """Return the nearest place to each wall, of those nearest to each of its bays (bays, 2)."""
     away_m = np.hypot(*(places_m - facade.middles_m[:, :2]).T).round(_MILLIMETRES)
     off_middle_m = np.abs(np.diff(facade.ends_m, axis=1)[:, 0])
     found: dict[object, int] = {}
