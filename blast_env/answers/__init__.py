@@ -1,5 +1,23 @@
 """Answers in words: documents made of the results of questions, and three renderers of them."""
 
-from blast_env.answers.document import AnyPart, Document, Line, Number, Picture, Section, Table
+from blast_env.answers.document import (
+    AnyPart,
+    Document,
+    Line,
+    Number,
+    Picture,
+    Section,
+    Table,
+    left_out_words,
+)
 
-__all__ = ["AnyPart", "Document", "Line", "Number", "Picture", "Section", "Table"]
+__all__ = [
+    "AnyPart",
+    "Document",
+    "Line",
+    "Number",
+    "Picture",
+    "Section",
+    "Table",
+    "left_out_words",
+]

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blast_env.answers import Line
-from blast_env.answers.document import left_out_words
+from blast_env.answers import Line, left_out_words
 from blast_env.answers.screening import screening_answer
 from blast_env.atlas import Laws, SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
