@@ -319,9 +319,7 @@ def test_a_requirement_is_kept_only_if_no_place_of_the_charge_breaks_it(
     assert any(f"{required.words} fails with the charge at (" in line for line in lines)
 
 
-def test_a_vehicle_is_screened_where_it_is_nearest_to_each_wall_and_that_is_named() -> (
-    None
-):
+def test_a_vehicle_is_screened_where_it_is_nearest_to_each_wall_and_that_is_named() -> None:
     vehicle = {
         "kind": "vehicle",
         "entries": [{"start_m": [0.0, 2.0], "end_m": [0.0, 8.0]}],
