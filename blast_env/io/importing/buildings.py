@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, named
+from blast_env.io.importing.bodies import LEAST_STOREY_M
 from blast_env.io.importing.doubles import without_doubles
 from blast_env.io.importing.ledger import Fate
 from blast_env.io.importing.options import ImportOptions
@@ -25,6 +26,8 @@ _QUARTER_SIDES: Final = 4
 _LEAST_SHARE: Final = 0.1
 _LEAST_M2: Final = 1.0
 """Least overlap, of the smaller building: less is inaccuracy of the map."""
+
+_HALF: Final = 0.5  # of a building
 
 _PART_SHARE: Final = 0.5
 """Least share of a part that lies in its building."""
@@ -64,6 +67,8 @@ _MOST_STOREYS_LOW: Final = 10
 _MOST_STOREYS: Final = 200
 _BRIDGE: Final = "bridge"
 _GENERAL: Final = ("", "yes")
+_SOLID_BELOW: Final = "raised parts, solid to the ground, where their building is drawn below them"
+_ON_TERRACE: Final = "buildings on terraces without an underside, on the top of the terrace"
 _HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
 
 
@@ -73,7 +78,8 @@ def prepared(site: SitePlacement) -> SitePlacement:
     buildings = [_sound(site, thing) for thing in site.of_role(Role.BUILDING)]
     single = without_doubles(buildings, site.ledger)
     buildings = on_the_ground(single, site.options.level_height_m, site.ledger)
-    buildings = _apart(site, _with_heights(site, _with_parts(site, buildings)))
+    buildings = _on_terraces(site, _with_heights(site, _with_parts(site, buildings)))
+    buildings = _apart(site, buildings)
     left = {building.place for building in buildings}
     gone = [building for building in single if building.place not in left]
     return replace(site, things=(*others, *buildings), faulty=(*site.faulty, *gone))
@@ -206,7 +212,11 @@ def _cut(site: SitePlacement, order: Sequence[Thing]) -> list[Thing]:
             if index < k and _overlap(thing, order[index]):
                 cut.append(order[index])
                 shape = areas_of(shapely.difference(shape, order[index].geometry))
-                found += _filled(thing, order[index], left, index)
+                filled = [*_filled(thing, order[index], left, index)]
+                if filled and _is_more_than_a_podium(thing, order[index]):
+                    part, detail = order[index], f"from {order[index].base_m:g} m"
+                    site.ledger.add(Fate.GUESSED, _SOLID_BELOW, part.place, part.name, detail)
+                found += filled
         if cut:
             is_own = cut[0].is_part and _are_related(thing, cut[0])
             kind = "parts above their building" if is_own else "buildings over buildings"
@@ -217,6 +227,15 @@ def _cut(site: SitePlacement, order: Sequence[Thing]) -> list[Thing]:
             site.ledger.add(fate, f"{kind}, {outcome}", thing.place, thing.name, detail)
         left[k] = replace(thing, geometry=shape)
     return [*found, *(building for building in left if not building.geometry.is_empty)]
+
+
+def _is_more_than_a_podium(whole: Thing, part: Thing) -> bool:
+    """Return whether a building is higher than the underside of a part above it.
+
+    Then its outline may say only what it covers, and the ground below the part may be open.
+    """
+    is_own = part.is_part and not whole.is_part and _are_related(whole, part)
+    return is_own and (whole.height_m or 0.0) > part.base_m + LEAST_STOREY_M
 
 
 def _are_related(one: Thing, other: Thing) -> bool:
@@ -266,6 +285,36 @@ def _with_heights(site: SitePlacement, buildings: Sequence[Thing]) -> list[Thing
             thing = replace(thing, base_m=base_m)
         _check_height(site, thing)
         found.append(thing)
+    return found
+
+
+def _on_terraces(site: SitePlacement, buildings: Sequence[Thing]) -> list[Thing]:
+    """Return buildings, those without an underside on the terraces below them.
+
+    Tags count from there, so that the top rises; coordinates of models and drawings stay.
+    """
+    terraces = [thing for thing in buildings if thing.carries and thing.height_m]
+    tree = shapely.STRtree([terrace.geometry for terrace in terraces])
+    found = []
+    for thing in buildings:
+        below = [terraces[index] for index in tree.query(thing.geometry, "intersects").tolist()]
+        tops_m = [
+            terrace.height_m or 0.0
+            for terrace in below
+            if _common(thing, terrace).area > _HALF * thing.geometry.area
+        ]
+        top_m = max(tops_m, default=0.0)
+        if thing.carries or thing.base_m or not top_m:
+            found.append(thing)
+            continue
+        rise_m = 0.0 if thing.has_z else top_m
+        height_m = None if thing.height_m is None else thing.height_m + rise_m
+        if height_m is not None and height_m <= top_m:
+            found.append(thing)
+            continue
+        detail = f"from {top_m:g} m"
+        site.ledger.add(Fate.GUESSED, _ON_TERRACE, thing.place, thing.name, detail)
+        found.append(replace(thing, base_m=top_m, height_m=height_m))
     return found
 
 

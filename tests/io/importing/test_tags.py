@@ -296,6 +296,31 @@ def test_an_underside_at_the_top_leaves_the_storeys_their_height(tmp_path: Path)
     assert places(found, Fate.GUESSED, "not above the underside") == ["features[2]"]
 
 
+def test_a_building_on_a_terrace_stands_on_its_top(tmp_path: Path) -> None:
+    terrace = outline(rectangle(30, 0, 30, 20), height=1.0, carries="yes", name="Terrace")
+    hall = outline(rectangle(35, 5, 10, 10), height=6.0, name="Hall")
+    raised = outline(rectangle(50, 5, 5, 5), height=7.0, min_height=4.0, name="Canopy")
+    found = of_map(tmp_path, terrace, hall, raised)
+    assert heights(found)["features[3]"] == (1.0, 7.0)
+    assert heights(found)["features[4]"] == (4.0, 7.0)
+    assert places(found, Fate.GUESSED, "on terraces without an underside") == ["features[3]"]
+
+
+@pytest.mark.parametrize(("height", "is_podium"), [(4.0, True), (12.0, False), (None, False)])
+def test_a_raised_part_that_its_building_fills_is_named_but_for_a_tower_on_a_podium(
+    height: float | None, is_podium: bool, tmp_path: Path
+) -> None:
+    tags = {} if height is None else {"height": height}
+    whole = outline(rectangle(30, 0, 20, 10), name="Arcade", **tags)
+    key = "building:part"
+    raised = {key: "yes", "height": 12.0, "min_height": 4.0}
+    part = outline(rectangle(30, 0, 10, 10)) | {"properties": raised}
+    other = outline(rectangle(40, 0, 10, 10)) | {"properties": {key: "yes", "height": 9.0}}
+    found = of_map(tmp_path, whole, part, other)
+    named = places(found, Fate.GUESSED, "raised parts, solid to the ground")
+    assert named == ([] if is_podium else ["features[3]"])
+
+
 @pytest.mark.parametrize(
     ("tags", "count"),
     [
