@@ -218,13 +218,20 @@ class AttackGame(AECEnv[str, dict[str, Any], int]):  # type: ignore[misc]  # unt
     def shares(self, places: Sequence[int] | None = None) -> FloatArray:
         """Return the attacker's payoff at places, by a blast each (places,).
 
+        That of a layout that hides a building is the payoff without a barrier.
+
         Args:
             places: Numbers of the places; all unless given.
         """
         chosen = range(len(self.charges)) if places is None else places
         charges = [self.charges[place] for place in chosen]
-        found: FloatArray = self._loads(self.layout, charges) / self._worst_unprotected
-        return found
+        found = self._loads(self.layout, charges)
+        # A layout that hides a building, whose load is no number, is worth as much as none.
+        hides = np.isnan(found)
+        if hides.any():
+            found[hides] = self._loads((), charges)[hides]
+        shares: FloatArray = found / self._worst_unprotected
+        return shares
 
     def best_response(self) -> int:
         """Return the place of the largest load, by a blast at each: the attacker's best answer."""

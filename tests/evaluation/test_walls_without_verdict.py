@@ -27,6 +27,7 @@ from blast_env.design.search import (
     advise,
 )
 from blast_env.design.search.advised import site_with_target
+from blast_env.envs.attack_game import ATTACKER, DEFENDER, AttackGame
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -293,6 +294,15 @@ def test_no_reward_is_paid_for_hiding_a_building(reward: str) -> None:
     assert np.isnan(info["impulse_pa_s"])
     assert info["reduction"] == 0.0
     assert paid == {"terminal": -1.0, "incremental": -1.0, "relative": 0.0}[reward]
+
+
+def test_no_game_pays_for_hiding_a_building(cache: Path) -> None:
+    """The payoffs of both had been no numbers; they are those without a barrier."""
+    game = AttackGame(site("other"), ENGINE, cache)
+    game.reset(options={"layout": WALLS})
+    game.step(int(game.observe(DEFENDER)["action_mask"].argmax()))
+    game.step(game.best_response())
+    assert game.rewards == {DEFENDER: -1.0, ATTACKER: 1.0}
 
 
 def test_a_hidden_building_has_no_high_level_of_protection() -> None:
