@@ -414,9 +414,12 @@ class Session:
 
 
 def score_of(run: RunJudgement) -> Score:
-    """Return the score of a judged layout: 0 with nothing placed, 1 for the best known layout."""
-    most = 1.0 - run.best
-    score = 0.0 if most < _SAME else min(max((1.0 - run.share) / most, 0.0), 1.0)
+    """Return the score of a judged layout: 0 with nothing placed, 1 for the best known layout.
+
+    Where that takes nothing off, 1 is for all that does.
+    """
+    most, taken_off = 1.0 - run.best, 1.0 - run.share
+    score = float(taken_off > _SAME) if most < _SAME else min(max(taken_off / most, 0.0), 1.0)
     return Score(score=score, share=run.share, best_share=run.best)
 
 

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from math import prod
 from typing import Any
 
@@ -12,12 +13,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.benchmark import Definition, stored_references
+from blast_env.benchmark import Definition, ReferenceLayout, stored_references
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
 from blast_env.tools import TOOLS, Session, call_tool
 from tests.benchmark.row import RowEngine
-from tests.tools.row_session import BEST, NAME, HeldEngine, said, session, submitted, walls
+from tests.tools.row_session import (
+    BEST,
+    NAME,
+    REFERENCE,
+    HeldEngine,
+    said,
+    session,
+    submitted,
+    walls,
+)
 
 WALL = walls(BEST[0])
 
@@ -211,6 +221,13 @@ def test_a_problem_without_a_stored_reference_is_scored_by_the_best_proposal() -
     assert score["share"] == pytest.approx(left(best))
     assert score["best_share"] <= score["share"]
     assert 0.0 < score["score"] <= 1.0
+
+
+def test_what_is_better_than_a_best_known_layout_that_takes_nothing_off_scores_1() -> None:
+    """It had scored 0, as nothing placed does: on a generated site no rule may help."""
+    known = replace(REFERENCE, best=ReferenceLayout("nothing", ()))
+    assert submitted(session(reference=known)) == 0.0
+    assert submitted(session(reference=known), *BEST[:1]) == 1.0
 
 
 def test_ten_thousand_calls() -> None:
