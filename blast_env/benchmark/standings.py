@@ -1,7 +1,9 @@
 """The standings: tables of the judged submissions, one row per method."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import isnan
+from operator import attrgetter
 
 import numpy as np
 
@@ -63,9 +65,14 @@ def _table(judged: Sequence[SubmissionJudgement], problems: Sequence[str], cell_
         100.0 * (1.0 - float(np.mean(shares)))
         for shares in ([run.rule for run in runs], [run.best for run in runs])
     )
+    # By the score of any layout: both have 1 in a problem without a better one than the rule's.
+    of_rule, of_best = (
+        float(np.mean([replace(run, share=share(run)).score for run in runs]))
+        for share in (attrgetter("rule"), attrgetter("best"))
+    )
     found: list[tuple[float, float, tuple[str, ...]]] = [
         (off - rule, score, (name, "", "", f"{off:.1f}", f"{off - rule:+.1f}", "", f"{score:.2f}"))
-        for name, score, off in (("best known", 1.0, best), ("best rule", 0.0, rule))
+        for name, score, off in (("best known", of_best, best), ("best rule", of_rule, rule))
     ]
     entries = [
         (entry, budget) for entry in judged for budget in sorted({run.budget for run in entry.runs})

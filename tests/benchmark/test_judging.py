@@ -122,6 +122,14 @@ def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
     assert f"{NAME}; cells of 0.5 m" in page
 
 
+def test_the_best_rule_has_the_score_of_an_entry_with_the_same_layout() -> None:
+    """Where no better one is known that is 1: beside a best rule with 0 it looked like a lead."""
+    same = replace(judged(run(16)).runs[0], best=0.98)
+    entry = replace(judged(run(16)), runs=(same,))
+    (table,) = standings_tables((entry,))
+    assert {(row[4], row[6]) for row in table.rows} == {("+0.0", "1.00")}
+
+
 def test_the_command_takes_both_kinds_of_files_and_writes_the_page(tmp_path: Path) -> None:
     own = judged(run(13), run(14, 50))
     for path in (own.save(tmp_path / "judged.json"), own.submission.save(tmp_path / "own.json")):
