@@ -591,7 +591,7 @@ def _structure_feature(kind: FeatureKind, structure: AnyStructure) -> Feature:
     return feature
 
 
-def _said_of(structure: AnyStructure) -> dict[str, str | float]:
+def _said_of(structure: AnyStructure) -> dict[str, str | float | bool]:
     """Return the properties of a structure, without those that are None or a base of 0."""
     said = {
         "weight": structure.weight,
@@ -599,6 +599,7 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
         "base_m": structure.base_m or None,
         "building": structure.building,
         "title": structure.title or None,
+        "carries": structure.carries or None,
     }
     return {key: item for key, item in said.items() if item is not None}
 

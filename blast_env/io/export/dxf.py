@@ -14,7 +14,7 @@ from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.io.export.bill import MODULE, LayoutPlan, stock_of
-from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, VEHICLE_KEY
+from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, STRUCTURE_KEYS, VEHICLE_KEY
 from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
@@ -39,6 +39,7 @@ NOTES_LAYER: Final = "NOTES"
 ITEMS_LAYER: Final = "ITEMS"
 """Layer of the texts in the pieces of a catalogue; it can be hidden."""
 
+_STRUCTURES: Final = (Kinds.TERRACE, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE)
 _STRING: Final = 1000  # group code of a text in extended data
 _TEXT_HEIGHT_M: Final = 0.4
 _ROUNDING: Final = 1e-6  # of a count of signs
@@ -315,11 +316,16 @@ def _draw(space: Modelspace, feature: Feature) -> None:
 
 
 def _describe(entity: DXFGraphic, feature: Feature) -> None:
-    """Give the place of a charge its mass, height and weight, which no layer says."""
+    """Give an entity what no layer says: of charges, and of structures and the ground below."""
     if feature.kind is Kinds.CHARGE_PLACE:
         keys = (key for key in (*CHARGE_KEYS, VEHICLE_KEY) if key in feature.properties)
-        said = (f"{key}={feature.properties[key]}" for key in keys)
-        entity.set_xdata(APPLICATION, [(_STRING, text) for text in said])
+        said = [f"{key}={feature.properties[key]}" for key in keys]
+    elif feature.kind in _STRUCTURES:
+        carries = "yes" if feature.properties.get("carries") else "no"
+        said = [f"{key}={own}" for key, own in zip(STRUCTURE_KEYS, (carries, 0), strict=True)]
+    else:
+        return
+    entity.set_xdata(APPLICATION, [(_STRING, text) for text in said])
 
 
 def _barrier_texts(feature: Feature) -> list[str]:

@@ -19,7 +19,13 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, named, quoted, suggestion, value_text
 from blast_env.io.importing.bodies import LEAST_STOREY_M, BodyPart, Faces
 from blast_env.io.importing.ledger import Fate
-from blast_env.io.importing.options import APPLICATION, CHARGE_KEYS, UNITS_M, VEHICLE_KEY
+from blast_env.io.importing.options import (
+    APPLICATION,
+    CHARGE_KEYS,
+    STRUCTURE_KEYS,
+    UNITS_M,
+    VEHICLE_KEY,
+)
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_POINTS,
@@ -71,6 +77,7 @@ _MEET_M: Final = 1e-3  # corners of faces of one body
 _NOWHERE: Final = Point()
 _HIDDEN: Final = "entities that are not shown"
 _AROUND_TEXT: Final = 8  # a hole in a hatch for a text
+_OWN_KEYS: Final = (*CHARGE_KEYS, *STRUCTURE_KEYS, VEHICLE_KEY)
 _FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
 """Entities whose outline is that of a picture."""
 
@@ -466,11 +473,11 @@ def _is_hidden(entity: DXFEntity) -> bool:
 
 
 def _own_data(entity: DXFEntity) -> dict[str, str]:
-    """Return what a drawing of blast-env says of a place of a charge."""
+    """Return what a drawing of blast-env says of a place of a charge, or of a structure."""
     if not entity.has_xdata(APPLICATION):
         return {}
     pairs = (str(value).partition("=") for _, value in entity.get_xdata(APPLICATION))
-    return {key: value for key, _, value in pairs if key in (*CHARGE_KEYS, VEHICLE_KEY)}
+    return {key: value for key, _, value in pairs if key in _OWN_KEYS}
 
 
 def _rise(entity: DXFEntity) -> FloatArray:
@@ -492,7 +499,8 @@ def _shown(
     geometry: BaseGeometry, tags: Tags, place: str, extent_m: tuple[float, float] | None = None
 ) -> MapFeature:
     fault = "entities without an extent in plan" if geometry.is_empty else ""
-    return MapFeature(geometry, tags, place, fault, extent_m=extent_m)
+    ground_m = 0.0 if "ground_m" in tags else None
+    return MapFeature(geometry, tags, place, fault, extent_m=extent_m, ground_m=ground_m)
 
 
 def _in_units(outline: BaseGeometry, unit_m: float) -> BaseGeometry:

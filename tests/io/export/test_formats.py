@@ -153,6 +153,26 @@ def test_structures_in_ifc_come_back_as_they_are_low_ones_and_terraces_too(tmp_p
     assert named["tower"].building_name == named["wing"].building_name
 
 
+@pytest.mark.parametrize("suffix", [".geojson", ".dxf", ".ifc"])
+def test_raised_structures_and_protected_terraces_come_back(suffix: str, tmp_path: Path) -> None:
+    if suffix == ".ifc":
+        pytest.importorskip("ifcopenshell")
+    structures = (
+        block("podium", 6.0, 2.0, 16, 14, height_m=1.0, carries=True, protected=True),
+        block("hall", 8.5, 3.5, 10, 8, base_m=1.0, height_m=4.0),
+        block("bridge", 16.0, 12.0, 8, 8, base_m=6.0, height_m=9.0),
+    )
+    scenario = site("raised", (30.0, 20.0, 12.0), point(2.0, 6.0, 5.0), *structures)
+    path = export_layout(LayoutPlan(scenario, ()), tmp_path / f"raised{suffix}")
+    found = import_site(path, ImportOptions(charge_at=((2.0, 6.0),))).scenario.structures
+    heights = {(own.modules, own.base_m, own.height_m, own.carries, own.protected) for own in found}
+    assert heights == {
+        (224, 0.0, 1.0, True, True),
+        (80, 1.0, 4.0, False, False),
+        (64, 6.0, 9.0, False, False),
+    }
+
+
 @pytest.mark.parametrize("suffix", [".geojson", ".dxf"])
 def test_an_exported_vehicle_is_named_where_it_is_not_imported(suffix: str, tmp_path: Path) -> None:
     other = gate_site(charge=[vehicle_document(), point(7.0, 1.0, 5.0)])
