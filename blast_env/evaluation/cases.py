@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from operator import attrgetter
 from typing import ClassVar, Final
 
 import numpy as np
@@ -252,7 +253,7 @@ class LoadCaseSet:
     def charges(self) -> tuple[AnyCharge, ...]:
         """The charges of one realisation; a charge that was drawn twice is included twice."""
         count = max(len(self.threats) // self.realisations, 1)
-        return tuple(threat.charge for threat in self.threats[:count])
+        return tuple(map(attrgetter("charge"), self.threats[:count]))
 
     def charges_against(self, layout: Sequence[Element]) -> tuple[Charge, ...]:
         """Return `charges` at their places with a layout."""

@@ -26,7 +26,7 @@ _MOST_ROOMS: Final = 4
 
 def _references(rooms: Sequence[NDArray[np.float32]]) -> list[int]:
     """Return how many references each room has, those of the list and of the count included."""
-    return [getrefcount(kept) for kept in rooms]
+    return list(map(getrefcount, rooms))
 
 
 _NOBODY: Final = _references([np.empty(0, dtype=np.float32)])[0]

@@ -16,6 +16,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.metadata import entry_points
+from operator import attrgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Protocol, Self
 
@@ -306,7 +307,7 @@ def default_engine(use: str, *scenarios: Scenario) -> str:
         use: The id of an environment, or a command.
     """
     # A site that states heights means them.
-    if any(scenario.height_notes for scenario in scenarios):
+    if any(map(attrgetter("height_notes"), scenarios)):
         return JUDGE
     return PAPER_ENGINES.get(use, JUDGE)
 
