@@ -22,7 +22,8 @@ from blast_env.evaluation import BlastCounts
 from blast_env.evaluation.cases import are_all, fixed_charges, has_few_places
 from blast_env.evaluation.questions.reduction import Evaluation
 from blast_env.geometry import layout_counts
-from blast_env.site import ObjectiveSection, VehicleSource
+from blast_env.site import AnyCharge, ObjectiveSection, VehicleSource
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -77,6 +78,9 @@ def sampling_notes(found: Evaluation) -> Iterator[str]:
             f"the site has {fixed} fixed charges, which all count here{alike}; the interval "
             "is their spread, not an uncertainty about others"
         )
+    elif not fixed and _are_at_one_place(charges) and not found.engine.has_noise:
+        if len({source.weight for source in sources}) > 1:
+            yield "all masses count here alike, whatever the weights of their sources"
     elif not fixed and has_few_places(scenario) and not found.engine.has_noise:
         shares = {
             source.weight / (source.places if isinstance(source, VehicleSource) else 1)
@@ -84,6 +88,12 @@ def sampling_notes(found: Evaluation) -> Iterator[str]:
         }
         if len(shares) > 1:
             yield "all places of charges count here alike, whatever the weights of their sources"
+
+
+def _are_at_one_place(charges: Sequence[AnyCharge]) -> bool:
+    """Return whether charges of several masses are at one place, which the user gave."""
+    places = {own.position_m if isinstance(own, Charge) else own for own in charges}
+    return len(charges) > 1 and len(places) == 1
 
 
 def cache_line(counts: BlastCounts) -> Line:

@@ -248,16 +248,17 @@ class ChargeInput:
         site counts once, unless it is given, too.
         """
         if self.place_m is not None and not fixed_charges(scenario):
-            return self._at_the_place(scenario)
+            return self._at_the_place(scenario, range(draws))
         drawn = in_turn(scenario, draw_threats(scenario, range(draws)))
         fixed = (replace(draw, charge=self.fixed(scenario, draw.charge)) for draw in drawn)
         return one_per_charge(fixed)
 
-    def _at_the_place(self, scenario: Scenario) -> tuple[LoadCase, ...]:
+    def _at_the_place(self, scenario: Scenario, seeds: Sequence[int]) -> tuple[LoadCase, ...]:
         """Return a threat of each mass and height at the given place: draws may miss a rare one."""
         charges = (Charge((0.0, 0.0), own.tnt_kg, own.height_m) for own in scenario.charge)
         placed = dict.fromkeys(self.fixed(scenario, charge) for charge in charges)
-        return tuple(LoadCase(charge, seed) for seed, charge in enumerate(placed))
+        # Without noise a seed tells nothing but which draw it was.
+        return tuple(LoadCase(charge, seeds[k % len(seeds)]) for k, charge in enumerate(placed))
 
     def drawn_by(
         self, scenario: Scenario, seeds: Sequence[int], engine: Engine
@@ -269,7 +270,7 @@ class ChargeInput:
         every mass of the site counts once there.
         """
         if self.place_m is not None and not (engine.has_noise or fixed_charges(scenario)):
-            return self._at_the_place(scenario)
+            return self._at_the_place(scenario, seeds)
         drawn = judged_threats(scenario, seeds, has_noise=engine.has_noise)
         threats = tuple(LoadCase(self.fixed(scenario, draw.charge), draw.seed) for draw in drawn)
         is_free = self.place_m is None or engine.has_noise

@@ -13,10 +13,11 @@ from blast_env.evaluation import evaluate_layout
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutFile, write_layout
 from blast_env.particles.event import EventRun
-from blast_env.site import PointSource
+from blast_env.site import PointSource, Scenario
 from tests.cli.running import run
 from tests.envs.small import small_scenario
 from tests.evaluation.cases import WALL
+from tests.gas_sites import hut
 from tests.scenarios import BALLISTIC_COURTYARD
 
 CELLS = WALL  # in the way of most threats: in sparse air, few modules hardly show
@@ -156,6 +157,23 @@ def test_fixed_charges_that_do_not_count_by_their_weights_or_at_all_are_named(
     both, one = (evaluate(*options, "--seeds", seeds).stdout for seeds in (2, 1))
     assert "2 fixed charges, which all count here alike, whatever their weights" in both
     assert "note: not among these: 1 of the 2 fixed charges of the site" in one
+
+
+def test_every_mass_of_a_site_counts_at_a_given_place(tmp_path: Path) -> None:
+    """Draws had missed that of a source which hardly ever comes, without a word."""
+    document = hut().model_dump(mode="json", exclude_none=True)
+    way = {"kind": "segment", "start_m": [1.0, 4.0], "end_m": [2.0, 4.0]}
+    document["charge"] = [way | {"tnt_kg": 1.0}, way | {"tnt_kg": 2.0, "weight": 1e-6}]
+    save_scenario(Scenario.from_document(document, "rare"), tmp_path / "rare.toml")
+    (tmp_path / "layout.json").write_text("[]")
+    site = ("--scenario", tmp_path / "rare.toml", "--layout", tmp_path / "layout.json")
+    options = (*site, "--engine", "gas", "--cell", "0.5", "--seeds", 2, "--out", tmp_path / "out")
+    alone = evaluate(*options).stdout
+    assert "note: not among these: any charge of 1 of the 2 sources of charges" in alone
+    placed = evaluate(*options, "--charge", "2,4").stdout
+    assert "note: all masses count here alike, whatever the weights" in placed
+    assert "not among these" not in placed
+    assert pd.read_csv(tmp_path / "out" / "threats.csv")["tnt_kg"].tolist() == [1.0, 2.0]
 
 
 def test_a_layout_is_exported_with_its_provenance(tmp_path: Path) -> None:
