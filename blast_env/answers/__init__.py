@@ -9,6 +9,7 @@ from blast_env.answers.document import (
     Section,
     Table,
     left_out_words,
+    nearer_words,
 )
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "Section",
     "Table",
     "left_out_words",
+    "nearer_words",
 ]

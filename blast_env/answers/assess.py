@@ -17,6 +17,7 @@ from blast_env.answers.document import (
     height_words,
     left_out_words,
     lines,
+    nearer_words,
     rounded_down,
     without_facade_words,
 )
@@ -139,6 +140,7 @@ def _verdict(blasts: Blasts, judged: Consequences, target: LevelOfProtection) ->
     layout = blasts.layouts[blasts.judged]
     left_out = (
         *left_out_words(blasts.scenario, own, layout),
+        *nearer_words(blasts.scenario, own),
         *without_facade_words(blasts.scenario),
     )
     yield from lines((f"flag: {note}" for note in (*left_out, *judged.notes)), "flag")

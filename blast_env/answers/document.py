@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, TypeAlias
 import numpy as np
 
 from blast_env.evaluation.cases import fixed_charges
+from blast_env.evaluation.places import nearest_place
 from blast_env.geometry import Element
 from blast_env.layout.build_site import vehicle_drive, worst_places
 from blast_env.site import (
     AnyCharge,
     AnySource,
     ObjectiveSection,
+    PointSource,
     Scenario,
     VehicleCharge,
     VehicleSource,
@@ -36,6 +38,10 @@ _FIGURES: Final = 3  # of a number
 _ERROR_FIGURES: Final = 2
 _ROUNDING: Final = 1e-9
 _PERCENT: Final = 100.0
+_NEARER_M: Final = 1.0
+_NEARER: Final = 1.1
+"""How much farther than its nearest place a charge may be without a word."""
+
 _SHOWN: Final = 0.0005  # the least share that is not printed as 0.0 %
 
 
@@ -407,6 +413,30 @@ def _nearer_words(
                 f" {name}, {away_m.min():.1f} m away at ({x_m:g}, {y_m:g}) m; its places here are"
                 f" {least_m:.1f} m away or more"
             )
+
+
+def nearer_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
+    """Yield how near a street or area comes to a building, if its charges are farther from it.
+
+    A verdict is under charges that are drawn, of which none need be at the nearest place.
+    """
+    own = [charge for charge in charges if isinstance(charge, Charge)]
+    for number, source in enumerate(scenario.charge, start=1):
+        here_m = [charge.position_m for charge in own if _is_of(source, charge)]
+        if isinstance(source, PointSource | VehicleSource) or not here_m:
+            continue
+        for name, parts in buildings_of(scenario.structures).items():
+            walls = loaded_walls(parts)
+            if not walls:
+                continue
+            x_m, y_m = nearest_place(scenario, source, walls)
+            away_m, *here = least_distances_m(walls, np.array([(x_m, y_m), *here_m])).tolist()
+            if min(here) > max(away_m + _NEARER_M, _NEARER * away_m):
+                yield (
+                    f"not among these: the nearest place of charge {number} ({source.tnt_kg:g} kg)"
+                    f" to {name}, {away_m:.1f} m away at ({x_m:.1f}, {y_m:.1f}) m; those here are"
+                    f" {min(here):.1f} m away or more"
+                )
 
 
 def without_facade_words(scenario: Scenario, limited: Collection[str] = ()) -> Iterator[str]:

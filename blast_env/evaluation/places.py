@@ -8,7 +8,7 @@ import numpy as np
 
 from blast_env.evaluation.blasts import Severity
 from blast_env.evaluation.cases import LoadCase
-from blast_env.geometry import Layout, WallLine
+from blast_env.geometry import Layout, Wall, WallLine
 from blast_env.sections import PointM
 from blast_env.site import (
     AnyCharge,
@@ -95,18 +95,24 @@ def _place_text(charge: Charge) -> str:
     return f"({x_m:.1f}, {y_m:.1f}) m"
 
 
-def nearest_place(scenario: Scenario, source: PlaceSource) -> PointM:
-    """Return the place of a source nearest to an assessed wall; of several, to a wall's middle."""
+def nearest_place(
+    scenario: Scenario, source: PlaceSource, walls: Sequence[Wall] | None = None
+) -> PointM:
+    """Return the place of a source nearest to an assessed wall; of several, to a wall's middle.
+
+    Args:
+        walls: The walls that count; all assessed ones unless given.
+    """
+    walls = scenario.loaded_walls if walls is None else walls
     boxes_m = [
-        (*wall.start_m, *wall.end_m) if isinstance(wall, WallLine) else wall
-        for wall in scenario.loaded_walls
+        (*wall.start_m, *wall.end_m) if isinstance(wall, WallLine) else wall for wall in walls
     ]
     # The nearest pair of two lines, or of a line and an area, has an end or corner of one of them.
     ends_m = np.array(boxes_m, dtype=np.float64).reshape(-1, 2, 2)
     middles_m = ends_m.mean(axis=1)
     points_m = np.concatenate((middles_m, ends_m.reshape(-1, 2)))
     places_m = np.concatenate((source.nearest_m(points_m), [*_spread(source, 2)]))
-    away_m = least_distances_m(scenario.loaded_walls, places_m).round(_MILLIMETRES)
+    away_m = least_distances_m(walls, places_m).round(_MILLIMETRES)
     off_m = np.linalg.norm(places_m[:, np.newaxis] - middles_m, axis=2).min(axis=1, initial=np.inf)
     x_m, y_m = places_m[np.lexsort((off_m, away_m))[0]].tolist()
     return x_m, y_m

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blast_env.answers import Line, left_out_words
+from blast_env.answers import Line, left_out_words, nearer_words
 from blast_env.answers.screening import screening_answer
 from blast_env.atlas import Laws, SiteAtlas, Walls, packaged_laws
 from blast_env.curves import kingery_bulmash, oblique
@@ -340,6 +340,21 @@ def test_a_vehicle_is_screened_where_it_is_nearest_to_each_wall_and_that_is_name
     (words,) = left_out_words(forecourt, charges)
     assert "to glass, 11.0 m away at (100, 9) m; its places here are 73.8 m away or more" in words
     assert not [*left_out_words(gate_site(), [VehicleCharge(vehicle_of(gate_site()), 0)])]
+
+
+def test_a_verdict_names_a_place_that_is_nearer_than_all_drawn_charges() -> None:
+    keys = {"height_m": 4.0, "protected": True}
+    near, far = (
+        builders.block(name, x_m, y_m, 20, 20, **keys)
+        for name, x_m, y_m in (("near", 20.0, 15.0), ("far", 100.0, 20.0))
+    )
+    street = along_a_street(50.0, near, far)
+    drawn = [Charge((x_m, 5.0), 50.0) for x_m in (25.0, 60.0)]
+    (words,) = nearer_words(street, drawn)
+    assert "charge 1 (50 kg) to far, 15.0 m away at (105.0, 5.0) m" in words
+    assert f"those here are {np.hypot(40.0, 15.0):.1f} m away or more" in words
+    assert not [*nearer_words(street, [*drawn, Charge((100.5, 5.0), 50.0)])]
+    assert not [*nearer_words(street, [Charge((60.0, 5.0), 4.0)])]  # another mass: the user's
 
 
 def test_requirements_name_one_scale() -> None:
