@@ -68,6 +68,7 @@ _MOST_STOREYS: Final = 200
 _BRIDGE: Final = "bridge"
 _GENERAL: Final = ("", "yes")
 _SOLID_BELOW: Final = "raised parts, solid to the ground, where their building is drawn below them"
+_INTO_TERRACE: Final = "terraces into which buildings reach, without the ground of these"
 _ON_TERRACE: Final = "buildings on terraces without an underside, on the top of the terrace"
 _HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
 
@@ -270,8 +271,10 @@ def _with_heights(site: SitePlacement, buildings: Sequence[Thing]) -> list[Thing
     guess = _Guess(buildings, site.options)
     found = []
     for thing in buildings:
-        if thing.carries and thing.height_m is None:
-            kind = "terraces without a height, on which nothing stands"
+        has_underside = thing.base_m > 0.0 or thing.kind in _ROOFS
+        if thing.carries and (thing.height_m is None or has_underside):
+            words = "open below" if has_underside else "without a height"
+            kind = f"terraces {words}, on which nothing stands"
             site.ledger.add(Fate.GUESSED, kind, thing.place, thing.name)
             thing = replace(thing, carries=False)
         if thing.height_m is None:
@@ -315,7 +318,23 @@ def _on_terraces(site: SitePlacement, buildings: Sequence[Thing]) -> list[Thing]
         detail = f"from {top_m:g} m"
         site.ledger.add(Fate.GUESSED, _ON_TERRACE, thing.place, thing.name, detail)
         found.append(replace(thing, base_m=top_m, height_m=height_m))
-    return found
+    return [_beside_buildings(site, thing, found) if thing.carries else thing for thing in found]
+
+
+def _beside_buildings(site: SitePlacement, terrace: Thing, buildings: Sequence[Thing]) -> Thing:
+    """Return a terrace without the ground of the buildings that do not stand on it."""
+    into = [
+        thing.geometry
+        for thing in buildings
+        if not thing.carries
+        and thing.base_m < (terrace.height_m or 0.0)
+        and _common(thing, terrace).area > 0.0
+    ]
+    if not into:
+        return terrace
+    site.ledger.add(Fate.CUT, _INTO_TERRACE, terrace.place, terrace.name)
+    left = shapely.difference(terrace.geometry, shapely.union_all(into))
+    return replace(terrace, geometry=areas_of(left))
 
 
 def _check_height(site: SitePlacement, thing: Thing) -> None:

@@ -306,6 +306,19 @@ def test_a_building_on_a_terrace_stands_on_its_top(tmp_path: Path) -> None:
     assert places(found, Fate.GUESSED, "on terraces without an underside") == ["features[3]"]
 
 
+def test_a_building_that_reaches_into_a_terrace_keeps_its_ground(tmp_path: Path) -> None:
+    terrace = outline(rectangle(30, 0, 30, 20), height=1.0, carries="yes", name="Terrace")
+    hall = outline(rectangle(55, 5, 20, 10), height=6.0, name="Hall")
+    deck = outline(rectangle(80, 0, 10, 10), height=3.0, min_height=2.5, carries="yes", name="Deck")
+    found = of_map(tmp_path, terrace, hall, deck)
+    assert heights(found)["features[3]"] == (0.0, 6.0)
+    assert heights(found)["features[4]"] == (2.5, 3.0)
+    areas = {own.place: own.outline.area for own in found.buildings}
+    assert areas["features[2]"] == pytest.approx(550.0, abs=1.0)
+    assert places(found, Fate.CUT, "into which buildings reach") == ["features[2]"]
+    assert places(found, Fate.GUESSED, "open below, on which nothing") == ["features[4]"]
+
+
 @pytest.mark.parametrize(("height", "is_podium"), [(4.0, True), (12.0, False), (None, False)])
 def test_a_raised_part_that_its_building_fills_is_named_but_for_a_tower_on_a_podium(
     height: float | None, is_podium: bool, tmp_path: Path
