@@ -99,8 +99,9 @@ def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Sess
     assert own.key == unprotected.key
     assert [row.layout for row in verdict_rows(blasted)] == ["no barrier", own.name]
     (without,), (with_glass,) = (blasted.judged(load, threat) for load in (unprotected, own))
-    assert number_of(with_glass.cells[2]) <= number_of(without.cells[2])  # panes broken
-    assert str(with_glass.cells[3]) < str(without.cells[3])  # worst pane: 5 is worse than 2
+    # Under this charge both break all panes; better ones less far.
+    assert number_of(with_glass.cells[2]) <= number_of(without.cells[2])
+    assert with_glass.severity < without.severity
     blasted.undo()
 
 
