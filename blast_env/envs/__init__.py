@@ -10,15 +10,20 @@ BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
 
 def register_environments() -> None:
-    """Register all environments without importing their modules."""
+    """Register all environments without importing their modules.
+
+    Without Gymnasium's checker: it knows no vectors as rewards, and in 1.4.0 every step ends in its
+    error after a first `reset` that an environment refuses.
+    """
     gym.register(
         id="BlastSimulator-v0",
         entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
+        disable_env_checker=True,
     )
     gym.register(
         id="BlastBarrier-MO-v0",
         entry_point="blast_env.envs.two_objectives:BlastBarrierTwoObjectivesEnv",
-        disable_env_checker=True,  # Gymnasium's knows no vectors as rewards
+        disable_env_checker=True,
         kwargs={"scenario": "courtyard"},
     )
     _register_barrier("BlastBarrier-v0", scenario="courtyard")
@@ -33,5 +38,6 @@ def _register_barrier(environment_id: str, **arguments: str) -> None:
         id=environment_id,
         entry_point=BARRIER_ENTRY_POINT,
         vector_entry_point="blast_env.envs.vector_env:BlastBarrierVectorEnv",
+        disable_env_checker=True,
         kwargs=arguments,
     )

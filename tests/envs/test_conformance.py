@@ -236,3 +236,15 @@ def test_observations_that_somebody_keeps_stay_as_they_are(again: Any) -> None:
         said.append(kept[-1].copy())
     assert not same(*kept)
     assert same(kept, said)
+
+
+def test_an_episode_after_a_refused_first_reset_is_like_any_other() -> None:
+    """Gymnasium's checker (1.4.0) had ended every step in an error of its own."""
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    env, other = (gym.make("BlastBarrier-v0", action="place", **chosen) for _ in range(2))
+    with pytest.raises(BlastEnvError, match="tnt_kg"):
+        env.reset(options={"tnt_kg": 0.0})
+    for own in (env, other):
+        own.reset(seed=2)
+    assert same(env.step(11), other.step(11))
+    assert same(env.step(FINISH), other.step(FINISH))
