@@ -24,7 +24,6 @@ import torch
 import typer
 from blast_agents.packaged import (
     DRAWS,
-    FEW_DRAWS,
     CandidateNetwork,
     PackagedAgent,
     Weights,
@@ -81,6 +80,9 @@ _HIDDEN_EVERY: Final = 5
 
 _BEST: Final = 8
 """Layouts kept of each search."""
+
+_FEW: Final = 8
+"""Draws of which the best is compared with the best of all."""
 
 SHOWN_DRAWS: Final = 16
 """Draws of the agent that a search begins with."""
@@ -289,13 +291,13 @@ def _guessed(agent: PackagedAgent, name: str, known: bool) -> tuple[float, ...]:
     one, *drawn = guesses.loads([tuple(sorted(layout)) for layout in layouts]).tolist()
     rules = layouts_by_rule(scenario, charge).values()
     unprotected, *ruled = guesses.loads([(), *rules]).tolist()
-    best = min(one, *drawn[:FEW_DRAWS]), min(one, *drawn), min(unprotected, *ruled)
+    best = min(one, *drawn[:_FEW]), min(one, *drawn), min(unprotected, *ruled)
     loads = np.array([one, np.mean(drawn), *best])
     return tuple(reductions(loads, np.full(len(loads), unprotected)).tolist())
 
 
 def _guessed_table(parts: Sequence[Trained]) -> str:
-    best = (f"best of it and {FEW_DRAWS}", f"best of it and {DRAWS}", "best rule")
+    best = (f"best of it and {_FEW}", f"best of it and {DRAWS}", "best rule")
     headers = ("seed", "after", "cases", "the policy", "mean draw", *best)
     rows = [
         (

@@ -41,10 +41,10 @@ Weights = Mapping[str, NDArray[np.float32]]
 WEIGHTS: Final = "packaged_agent.safetensors"
 """Name of the file of the weights, in this package."""
 
-FEW_DRAWS: Final = 8
+FEW_DRAWS: Final = 3
 """Layouts that the agent draws for one proposal."""
 
-FEW_CHANGES: Final = 144
+FEW_CHANGES: Final = 200
 """Changes of the best guesses that one proposal looks at after that."""
 
 DRAWS: Final = 32
@@ -59,8 +59,8 @@ SURE_GAIN: Final = 0.01
 MOST_DRAWS: Final = 10_000
 """Largest number of layouts of one call."""
 
-_FEW_CANDIDATES: Final = 12_000
-"""Candidates in all draws of one proposal: more take it far beyond 50 ms."""
+_FEW_CANDIDATES: Final = 1_500
+"""With more of them, one proposal looks at fewer draws and changes, in inverse proportion."""
 
 _MOST_BYTES: Final = 5_000_000
 
@@ -229,8 +229,9 @@ class PackagedAgent:
         """
         found = find_scenario(scenario)
         candidates = int(LayoutState.empty(found).legal.sum())
-        few = min(FEW_DRAWS, _FEW_CANDIDATES // max(candidates, 1))
-        return self.ranked(found, charge, few, changes=FEW_CHANGES * few // FEW_DRAWS)[0]
+        share = min(1.0, _FEW_CANDIDATES / max(candidates, 1))
+        draws, changes = int(FEW_DRAWS * share), int(FEW_CHANGES * share)
+        return self.ranked(found, charge, draws, changes=changes)[0]
 
     def likeliest(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the policy's layout, of the candidates with the highest scores.

@@ -4,6 +4,8 @@ On most generated sites the rules leave an agent little to win. `python -m studi
 looks for those where they do not, by guesses that a few blasts confirm.
 """
 
+from collections.abc import Sequence
+from itertools import product, zip_longest
 from typing import Final
 
 from blast_env.bundled import HEADROOM_SITES, ITEM_SITES, KERB_SITES
@@ -14,17 +16,40 @@ from blast_env.sites.item_sites import ItemSiteRanges
 from blast_env.sites.kerb_sites import kerb_site
 from blast_env.values import checked_seed
 
-HEADROOM_HELD_OUT: Final = (
-    *((ITEM_SITES, seed) for seed in (17, 29, 32)),
-    *((KERB_SITES, seed) for seed in (8, 9, 12, 13, 15, 17, 22, 25, 27, 29, 36)),
-)
-"""Kind and seed of those held out from training, by a search on the first 50 and 40 seeds."""
 
-HEADROOM_TRAINING: Final = tuple(
-    (KERB_SITES, HELD_OUT_SITES + number)
-    for number in (0, 4, 7, 14, 18, 21, 26, 27, 30, 31, 32, 37)
+def _in_turn(item_sites: Sequence[int], kerb_sites: Sequence[int]) -> tuple[tuple[str, int], ...]:
+    """Return kind and seed of sites of both kinds in turn, then of those that are left of one."""
+    pairs = zip_longest(product([ITEM_SITES], item_sites), product([KERB_SITES], kerb_sites))
+    return tuple(site for pair in pairs for site in pair if site is not None)
+
+
+# fmt: off
+_ITEM_SITES: Final = (
+    0, 2, 4, 5, 6, 7, 8, 13, 14, 16, 17, 18, 19, 22, 23, 24, 25, 27, 29, 31, 32, 33, 34, 35, 36,
+    38, 39, 40, 41, 44, 46, 50, 51, 52, 54, 58, 59, 60, 63, 64, 66, 69, 71, 72, 73, 75, 77,
 )
-"""Kind and seed of those of training, by a search on 40 seeds from 10,000 on."""
+_KERB_SITES: Final = (
+    0, 1, 2, 3, 4, 5, 7, 8, 9, 12, 13, 14, 15, 17, 19, 22, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34,
+    35, 36, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 53, 54, 55, 57, 58, 59, 60, 61, 62, 64, 65,
+    66, 68, 69, 71, 73, 74, 76, 77,
+)
+# fmt: on
+HEADROOM_HELD_OUT: Final = _in_turn(_ITEM_SITES, _KERB_SITES)
+"""Kind and seed of those held out from training, by a search on the first 80 of each kind."""
+
+# fmt: off
+_TRAINING_ITEM_SITES: Final = (
+    0, 3, 4, 6, 8, 9, 10, 11, 14, 18, 19, 21, 22, 25, 27, 33, 34, 38, 39,
+)
+_TRAINING_KERB_SITES: Final = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 14, 16, 17, 18, 19, 21, 24, 26, 27, 29, 30, 31, 32, 37, 38, 39,
+)
+# fmt: on
+HEADROOM_TRAINING: Final = _in_turn(
+    [HELD_OUT_SITES + number for number in _TRAINING_ITEM_SITES],
+    [HELD_OUT_SITES + number for number in _TRAINING_KERB_SITES],
+)
+"""Kind and seed of those of training, by a search on 40 of each kind from 10,000 on."""
 
 
 def headroom_site(seed: int) -> Scenario:

@@ -27,6 +27,13 @@ def test_seeds_held_out_from_training_stay_so() -> None:
     assert len(set(both)) == len(both)
 
 
+def test_the_first_sites_are_of_both_kinds() -> None:
+    """Whoever takes the first few does not judge on one kind alone."""
+    for sites in (HEADROOM_HELD_OUT, HEADROOM_TRAINING):
+        kinds = [kind for kind, _ in sites[:30]]
+        assert all(kinds.count(kind) == 15 for kind in set(kinds))
+
+
 @pytest.mark.parametrize("seed", [len(HEADROOM_HELD_OUT), 9_999, 10_000 + 10_000])
 def test_there_are_no_others(seed: int) -> None:
     with pytest.raises(BlastEnvError, match=rf"headroom_sites: seed is {seed}, must be 0 to"):
