@@ -170,21 +170,22 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/sites.md
-    "python -m studies.headroom --kind item_sites --kind kerb_sites --sites 10 --blasts 30": (
-        "--sites 2 --blasts 2"
-    ),
-    "python -m studies.headroom_sites --first 0 --sites 50": "--sites 1 --changes 4",
-    "python -m studies.headroom_sites --kind kerb_sites --first 0 --sites 40": (
+    "python -m studies.headroom --kind item_sites --kind kerb_sites": "--sites 2 --blasts 2",
+    "python -m studies.headroom_sites --first 0 --sites 80 --changes 2000": "--sites 1 --changes 4",
+    "python -m studies.headroom_sites --kind kerb_sites --first 0 --sites 80 --changes 2000": (
         "--sites 1 --changes 4"
     ),
-    "python -m studies.headroom_sites --kind kerb_sites --first 10000 --sites 40": (
+    "python -m studies.headroom_sites --first 10000 --sites 40 --changes 2000": (
         "--sites 1 --changes 4"
     ),
-    "python -m studies.headroom --kind headroom_sites --first 0 --sites 8 --blasts 20": (
+    "python -m studies.headroom_sites --kind kerb_sites --first 10000 --sites 40 --changes 2000": (
+        "--sites 1 --changes 4"
+    ),
+    "python -m studies.headroom --kind headroom_sites --first 0 --sites 20": (
         "--sites 2 --blasts 2"
     ),
     # docs/researchers/training.md
-    "python -m studies.packaged_agent judge --kind headroom_sites --first 0 --sites 14": (
+    "python -m studies.packaged_agent judge --kind headroom_sites --first 0 --sites 60": (
         "--sites 2"
     ),
     "python -m studies.packaged_agent show --out out/packaged/shown.jsonl": (
