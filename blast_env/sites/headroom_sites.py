@@ -1,7 +1,7 @@
 """Generated sites on which layouts are ahead of all rules: a list of their kinds and seeds.
 
-On four of ten generated sites the rules leave an agent little to win. `studies.headroom_sites` looks
-for the others, by guesses that a few blasts confirm.
+On four of ten generated sites the rules leave an agent little to win. `studies.headroom_sites`
+looks for the others, by guesses that a few blasts confirm.
 """
 
 from collections.abc import Sequence
