@@ -18,7 +18,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle, Wall, stacked_runs, standing
+from blast_env.geometry import WALLS, Element, Piece, Rectangle, Wall, stacked_runs, standing
 from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
 from blast_env.particles.objects import Colour
 from blast_env.sections import PointM
@@ -600,6 +600,7 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float | bool]:
         "building": structure.building,
         "title": structure.title or None,
         "carries": structure.carries or None,
+        "faces": None if structure.faces == WALLS else ",".join(structure.faces),
     }
     return {key: item for key, item in said.items() if item is not None}
 

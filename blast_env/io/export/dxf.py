@@ -321,8 +321,8 @@ def _describe(entity: DXFGraphic, feature: Feature) -> None:
         keys = (key for key in (*CHARGE_KEYS, VEHICLE_KEY) if key in feature.properties)
         said = [f"{key}={feature.properties[key]}" for key in keys]
     elif feature.kind in _STRUCTURES:
-        carries = "yes" if feature.properties.get("carries") else "no"
-        said = [f"{key}={own}" for key, own in zip(STRUCTURE_KEYS, (carries, 0), strict=True)]
+        own = {"ground_m": 0, **feature.properties}
+        said = [f"{key}={own[key]}" for key in STRUCTURE_KEYS if key in own]
     else:
         return
     entity.set_xdata(APPLICATION, [(_STRING, text) for text in said])

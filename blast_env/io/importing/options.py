@@ -25,8 +25,9 @@ APPLICATION: Final = "BLAST_ENV"
 CHARGE_KEYS: Final = ("tnt_kg", "above_ground_m", "weight")
 """What a file of blast-env says of a place of a charge: mass, height above the ground, weight."""
 
-STRUCTURE_KEYS: Final = ("carries", "ground_m")
-"""What a drawing of blast-env says of a structure: whether it is a terrace, and the ground, 0."""
+STRUCTURE_KEYS: Final = ("carries", "ground_m", "weight", "faces")
+"""What a drawing of blast-env says of a structure: whether it is a terrace, the ground, 0, its
+weight and its walls that count."""
 
 VEHICLE_KEY: Final = "width_m"
 """What it says of the entry of a vehicle in addition: the width of the vehicle, m."""

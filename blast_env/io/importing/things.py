@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from blast_env.errors import BlastEnvError, named, quoted, value_text
 from blast_env.io.importing.heights import HeightReader
-from blast_env.io.importing.ledger import Fate
+from blast_env.io.importing.ledger import Fate, Ledger
 from blast_env.io.importing.options import CHARGE_KEYS, VEHICLE_KEY, length_m
 from blast_env.io.importing.site_map import MapFeature, SiteMap, Tags
 
@@ -165,6 +165,8 @@ _WAYS: Final = frozenset({"pedestrian", "footway", "path", "cycleway", "bridlewa
 """Values of `highway` of ways that are no streets, unless they let motor vehicles in."""
 
 _ENTRY_KEYS: Final = ("motor_vehicle", "motorcar", "vehicle", "hgv", "goods")
+_ALL_WALLS: Final = "structures of which some walls counted: all walls do (faces)"
+_NO_WEIGHT: Final = "weights of structures, which are not read"
 VEHICLES: Final = "entries of vehicles, which an import does not make (a [[charge]] of the site)"
 _ON_FOOT: Final = "pedestrian streets, on which no charge is placed (--charges-from)"
 _PARKED_IN: Final = "car parks in or below buildings, with no charge there (--charge-at)"
@@ -373,6 +375,8 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         ledger.add(Fate.GUESSED, _PARKED_IN, feature.place)
     elif _is_car_park(tags) and not feature.geometry.area:
         ledger.add(Fate.GUESSED, _PARKED_AT, feature.place)
+    if own in _OWN_STRUCTURES:
+        _note_lost(tags, feature.place, ledger)
     part_of = feature.part_of or whole
     tnt_kg = length_m(tags["tnt_kg"]) if "tnt_kg" in tags else None
     if "tnt_kg" in tags and role is Role.CHARGE and not tnt_kg:
@@ -405,6 +409,15 @@ def _thing(feature: MapFeature, role: Role, reader: HeightReader, whole: str) ->
         above_m=above_m or 0.0,
         weight=weight or None,
     )
+
+
+def _note_lost(tags: Tags, place: str, ledger: Ledger) -> None:
+    """Enter what a file of blast-env says of a structure, and an import does not read."""
+    faces, weight = tags.get("faces"), length_m(tags.get("weight", 1.0))
+    if faces:
+        ledger.add(Fate.GUESSED, _ALL_WALLS, place, detail=f"only {value_text(faces)} counted")
+    if weight not in (None, 1.0):
+        ledger.add(Fate.GUESSED, _NO_WEIGHT, place, detail=f"{weight:g}")
 
 
 def _fault(feature: MapFeature, role: Role, has_layers: bool) -> str:

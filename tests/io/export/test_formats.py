@@ -174,6 +174,21 @@ def test_raised_structures_and_protected_terraces_come_back(suffix: str, tmp_pat
 
 
 @pytest.mark.parametrize("suffix", [".geojson", ".dxf"])
+def test_walls_that_count_and_weights_are_named_where_they_are_lost(
+    suffix: str, tmp_path: Path
+) -> None:
+    front = block("front", 6.0, 2.0, 8, 8, height_m=3.0, protected=True, faces=["west"], weight=2.0)
+    plain = block("plain", 16.0, 2.0, 8, 8, height_m=3.0, protected=True)
+    scenario = site("fronts", (30.0, 20.0, 8.0), point(2.0, 6.0, 5.0), front, plain)
+    path = export_layout(LayoutPlan(scenario, ()), tmp_path / f"fronts{suffix}")
+    guesses = import_site(path).ledger.of(Fate.GUESSED)
+    walls, weight = (
+        [own.detail for own in guesses if words in own.kind] for words in ("all walls", "weights")
+    )
+    assert (walls, weight) == (["only 'west' counted"], ["2"])
+
+
+@pytest.mark.parametrize("suffix", [".geojson", ".dxf"])
 def test_an_exported_vehicle_is_named_where_it_is_not_imported(suffix: str, tmp_path: Path) -> None:
     other = gate_site(charge=[vehicle_document(), point(7.0, 1.0, 5.0)])
     path = export_layout(LayoutPlan(other, ()), tmp_path / f"gate{suffix}")
