@@ -37,8 +37,8 @@ from blast_env.cli.output import progress_bar, user_errors
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.learnt import Guesses, case_for, improved
 from blast_env.design.search.package import PackageProposer
-from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.cases import in_turn
+from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCaseSet, SeedRange
+from blast_env.evaluation.cases import judged_threats
 from blast_env.files import make_folder
 from blast_env.runner import run_all
 from blast_env.statistics import mean_estimate, reductions
@@ -342,7 +342,8 @@ def judged(agent: PackagedAgent, cache: Path | None, charges: int, name: str) ->
     """Judge proposals against the first held-out charges on a site, on cells of 0.5 m."""
     scenario, found = scenario_of(name), []
     evaluator = BlastEvaluator(scenario, "gas", cache=cache)
-    for threat in in_turn(scenario, draw_threats(scenario, SeedRange.TEST.seeds(0, charges))):
+    seeds = SeedRange.TEST.seeds(0, charges)
+    for threat in judged_threats(scenario, seeds, has_noise=False):
         charge = threat.charge
         problem = DesignProblem(evaluator, LoadCaseSet(scenario, (threat,), charge=charge))
         agent.propose(scenario, charge)  # what a first call loads and compiles is not counted

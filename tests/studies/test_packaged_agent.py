@@ -9,10 +9,12 @@ from typer.testing import CliRunner
 
 from blast_env.design.search import Guesses
 from blast_env.design.search.learnt import case_for
+from blast_env.site import save_scenario
 from blast_env.surrogate import packaged_surrogate
 from studies.packaged_agent import app, read_shown, shown_cases
 from studies.packaged_training import charge_of, reinforced
 from studies.site_names import scenario_of
+from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
 
 SITE = "close_sites/16/10000"
 
@@ -56,3 +58,12 @@ def test_its_own_draws_make_it_better_by_guesses() -> None:
     learnt = reinforced(weights, [(SITE, True)] * 48, packaged_surrogate(), seed=0)
     before, after = (mean_load(PackagedAgent(CandidateNetwork(own))) for own in (weights, learnt))
     assert after < 0.97 * before
+
+
+def test_a_place_of_a_vehicle_is_judged_once_however_often_it_is_drawn(tmp_path: Path) -> None:
+    """Again it is no further evidence, and had narrowed the interval of a lead."""
+    vehicle = vehicle_document(places=2)
+    assert vehicle_of(gate_site(vehicle)).places == 2
+    save_scenario(gate_site(vehicle), tmp_path / "gate.toml")
+    printed = run("judge", str(tmp_path / "gate.toml"), "--cache", str(tmp_path / "blasts"))
+    assert "gate.toml | 2 |" in printed
