@@ -346,13 +346,22 @@ def _settled(before: Scenario, edit: Callable[[Document], None]) -> Scenario:
         except (ValidationError, BlastEnvError):
             return  # `changed` says what is wrong with them
         for own, section in zip(after, document["structures"], strict=True):
-            if own.base_m == stood_m.get(own.name):
+            is_same = own.base_m == stood_m.get(own.name) and not own.carries
+            if is_same and not _is_carried(own, after):
                 rise_m = ground_below_m(after, own.rectangle_m) - own.base_m
                 section["base_m"] = _plain(own.base_m + rise_m)
                 if own.height_m is not None:
                     section["height_m"] = _plain(own.height_m + rise_m)
 
     return changed(before, settle)
+
+
+def _is_carried(structure: AnyStructure, others: Iterable[AnyStructure]) -> bool:
+    """Return whether a structure stands on another one, be that a terrace or not."""
+    return structure.base_m > 0.0 and any(
+        other.height_m == structure.base_m and other.rectangle_m.overlaps(structure.rectangle_m)
+        for other in others
+    )
 
 
 def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:

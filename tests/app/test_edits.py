@@ -190,6 +190,9 @@ def test_what_stood_on_a_terrace_stands_on_the_ground_after_an_edit() -> None:
     (words,) = edits.settled_names(wide, beside)
     assert words == "hall stands on the ground below it, from 0 m (before: 1 m)"
     assert edits.moved(beside, hall, (-1.5, 0.0)) == wide
+    plain = edits.with_values(site, podium, {"carries": False})
+    assert plain.structures[0].base_m == 1.0  # it stands on the podium still
+    assert edits.with_values(plain, podium, {"carries": True}) == site
     raised = edits.with_values(site, hall, {"base_m": 2.0})
     assert edits.removed(raised, podium).structures[0].base_m == 2.0  # it hung there
 
