@@ -8,9 +8,8 @@ from blast_env.answers.document import (
     Picture,
     Section,
     Table,
-    left_out_words,
-    nearer_words,
 )
+from blast_env.answers.left_out import left_out_words, nearer_words
 
 __all__ = [
     "AnyPart",

@@ -8,11 +8,11 @@ from blast_env.answers.document import (
     AnyPart,
     Line,
     Table,
-    left_out_words,
     lines,
     percent,
     without_facade_words,
 )
+from blast_env.answers.left_out import left_out_words
 from blast_env.design.search.advice import Advice, MeasureKind
 from blast_env.design.search.advised import AdviceResult
 from blast_env.evaluation.questions.probability import DRAWS, probability_text

@@ -15,12 +15,11 @@ from blast_env.answers.document import (
     building_words,
     charge_text,
     height_words,
-    left_out_words,
     lines,
-    nearer_words,
     rounded_down,
     without_facade_words,
 )
+from blast_env.answers.left_out import left_out_words, nearer_words
 from blast_env.answers.pieces import pieces_answer
 from blast_env.evaluation.blasts import Blasts, NumberOf
 from blast_env.evaluation.engines.contract import Engine

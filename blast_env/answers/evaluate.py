@@ -13,11 +13,11 @@ from blast_env.answers.document import (
     building_words,
     height_words,
     interval,
-    left_out_words,
     lines,
     percent,
     validation_lines,
 )
+from blast_env.answers.left_out import left_out_words
 from blast_env.evaluation import BlastCounts
 from blast_env.evaluation.cases import are_all, fixed_charges, has_few_places
 from blast_env.evaluation.questions.reduction import Evaluation

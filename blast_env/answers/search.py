@@ -14,9 +14,9 @@ from blast_env.answers.document import (
     Table,
     charge_text,
     interval,
-    left_out_words,
     lines,
 )
+from blast_env.answers.left_out import left_out_words
 from blast_env.design.by_atlas import WORSE
 from blast_env.design.search import DesignProblem, SearchResult
 from blast_env.evaluation import Evaluation

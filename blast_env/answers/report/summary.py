@@ -11,12 +11,12 @@ from blast_env.answers.document import (
     Section,
     Table,
     height_words,
-    left_out_words,
     lines,
     percent,
     rounded_down,
     without_facade_words,
 )
+from blast_env.answers.left_out import left_out_words
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.places import place_text
 from blast_env.evaluation.questions.capacity import mass_near
