@@ -29,6 +29,7 @@ from blast_env.response import (
 )
 from blast_env.site import Charge, Scenario
 from tests.blasts import consequences
+from tests.builders import block, point, site_document
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 from tests.gas_sites import glazed_hut
 
@@ -116,6 +117,21 @@ def test_bending_alone_is_no_verdict_on_a_wall_that_may_be_breached() -> None:
     assert "checked from 1.7 to 8.6" in why
     far = judge(site(), ())
     assert not any("breached" in why for _, why in far.unchecked)
+
+
+def test_peaks_far_away_on_cells_that_have_doubled_are_flagged() -> None:
+    """Coarse cells of 0.5 m are doubled when the front has run 45 m."""
+    facade = {"facade": FACADE, "height_m": 2.5, "protected": True}
+    huts = [block(name, x_m, 4.0, 4, 4, **facade) for name, x_m in (("near", 20.0), ("far", 50.0))]
+    document = site_document("street", (60.0, 12.0, 6.0), point(2.0, 5.0, 5.0), *huts)
+    for cells, doubtful in (("coarse", {"far"}), ("uniform", set())):
+        evaluator = BlastEvaluator(
+            Scenario.from_document(document, "street"), GasEngine(cells=cells)
+        )
+        own = consequences(evaluator, (), [Charge((2.0, 5.0), 5.0)])
+        doubts = {building for building, why in own.unchecked if "may be too low" in why}
+        assert doubts == doubtful
+        assert any("farther than 45 m" in note for note in own.notes) is bool(doubtful)
 
 
 @pytest.mark.parametrize("scaled", [5.0, 10.0, 15.0])

@@ -89,6 +89,12 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> PeakWei
 NO_AIR: Final = "no air touches its assessed walls: it has no load"
 """Note on a building that other structures or pieces hide."""
 
+_DOUBLED: Final = (
+    "peaks on walls farther than {:g} m from the charge are those of cells of {:g} m, and may be"
+    " too low: take uniform cells"
+)
+"""Doubt about the peaks of cells that grow."""
+
 _BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
 
@@ -327,7 +333,21 @@ def _unchecked(result: GasOutcome) -> Iterator[tuple[str, str]]:
             own.update(dict.fromkeys(result.impulse(outline.name).notes))
             if result.run.site.scaled_distance(outline) < CHECKED_SCALED_DISTANCE[0]:
                 own[_BREACH] = None
+            own.update(dict.fromkeys(_doubled_words(result, outline.name)))
     yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
+
+
+def _doubled_words(result: GasOutcome, structure: str) -> Iterator[str]:
+    """Yield that the wave comes to walls of a structure on cells that have doubled, if it does.
+
+    Peaks are sharpened by the smallest cells (`peak_factor`), which is too little there.
+    """
+    doubled_m = result.run.settings.doubled_m
+    faces = result.on_walls[result.on_walls["structure"] == structure]
+    charge = result.run.site.charge
+    away_m = faces[["x_m", "y_m", "z_m"]].to_numpy(float) - (*charge.position_m, charge.height_m)
+    if doubled_m and np.linalg.norm(away_m, axis=1).max(initial=0.0) > doubled_m[0]:
+        yield _DOUBLED.format(doubled_m[0], 2.0 * result.run.grid.cell_m)
 
 
 def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
