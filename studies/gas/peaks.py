@@ -20,6 +20,7 @@ ENGINES: Final = (
     GasEngine(cell_m=0.25),
     GasEngine(cells="fine"),
     GasEngine(cells="fine", cell_m=0.125),
+    GasEngine(cells="fine", cell_m=0.1),
 )
 
 _BEFORE_M: Final = 5.0  # ground behind the charge
