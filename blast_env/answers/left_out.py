@@ -5,7 +5,7 @@ fixed ones that were not asked for, a source of which none was drawn, or a place
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from blast_env.evaluation.cases import fixed_charges
 from blast_env.evaluation.places import nearest_place
 from blast_env.geometry import Element
 from blast_env.layout.build_site import vehicle_drive, worst_places
+from blast_env.sections import PointM
 from blast_env.site import (
     AnyCharge,
     AnySource,
@@ -25,6 +26,7 @@ from blast_env.site.blast_site import Charge
 from blast_env.site.structures import buildings_of, loaded_walls
 from blast_env.vehicles.worst_places import least_distances_m
 
+_MOST_NAMES: Final = 3  # of further buildings
 _NEARER_M: Final = 1.0
 _NEARER: Final = 1.1
 """How much farther than its nearest place a charge may be without a word, in m and as a ratio."""
@@ -83,6 +85,33 @@ def _is_of(source: AnySource, charge: AnyCharge) -> bool:
     return mass == (source.tnt_kg, source.height_m) and source.has_place(charge.position_m)
 
 
+class _NearerPlace(NamedTuple):
+    """A place of a charge that is nearer to a building than all those of an answer."""
+
+    building: str
+    away_m: float
+    place_m: PointM
+    least_m: float
+
+
+def _nearest_words(found: Iterable[_NearerPlace], source: str, those_here: str) -> Iterator[str]:
+    """Yield one sentence on the nearest of some places, with the buildings of the others."""
+    by_distance = sorted(found, key=lambda place: place.away_m)
+    if not by_distance:
+        return
+    nearest, *others = by_distance
+    x_m, y_m = nearest.place_m
+    names = [place.building for place in others[:_MOST_NAMES]]
+    if len(others) > _MOST_NAMES:
+        names.append(f"{len(others) - _MOST_NAMES} more")
+    yield (
+        f"not among these: the nearest place of {source} to {nearest.building},"
+        f" {nearest.away_m:.1f} m away at ({round(x_m, 1):g}, {round(y_m, 1):g}) m; {those_here}"
+        f" are {nearest.least_m:.1f} m away or more"
+        f"{'; so it is with ' * bool(names)}{', '.join(names)}"
+    )
+
+
 def _nearer_vehicle_words(
     scenario: Scenario, source: VehicleSource, ranks: Iterable[int], layout: Sequence[Element]
 ) -> Iterator[str]:
@@ -93,6 +122,7 @@ def _nearer_vehicle_words(
     reach_m = vehicle_drive(scenario, source, layout).places_m
     worst = worst_places(scenario, source, layout)
     here_m = np.array([worst.place_m(rank) for rank in ranks])
+    found = []
     for name, parts in buildings_of(scenario.structures_with(layout)).items():
         walls = loaded_walls(parts)
         if not walls or not len(reach_m):
@@ -101,32 +131,37 @@ def _nearer_vehicle_words(
         least_m = float(least_distances_m(walls, here_m).min())
         if least_m > away_m.min() + source.least_apart_m:
             x_m, y_m = reach_m[away_m.argmin()].tolist()
-            yield (
-                f"not among these: the nearest place of a vehicle with {source.tnt_kg:g} kg to"
-                f" {name}, {away_m.min():.1f} m away at ({x_m:g}, {y_m:g}) m; its places here are"
-                f" {least_m:.1f} m away or more"
-            )
+            found.append(_NearerPlace(name, float(away_m.min()), (x_m, y_m), least_m))
+    vehicle = f"a vehicle with {source.tnt_kg:g} kg"
+    yield from _nearest_words(found, vehicle, "its places here")
 
 
 def nearer_words(scenario: Scenario, charges: Iterable[AnyCharge]) -> Iterator[str]:
-    """Yield how near a street or area comes to a building, if its charges are farther from it.
+    """Yield how near a street or area comes to a building, if all charges are farther from it.
 
-    A verdict is under charges that are drawn, of which none need be at the nearest place.
+    A verdict is under charges that are drawn, of which none need be at the nearest place. Nothing
+    is said where a charge of at least its mass from elsewhere is as near.
     """
     own = [charge for charge in charges if isinstance(charge, Charge)]
+    buildings = [
+        (name, walls)
+        for name, parts in buildings_of(scenario.structures).items()
+        if (walls := loaded_walls(parts))
+    ]
     for number, source in enumerate(scenario.charge, start=1):
-        here_m = [charge.position_m for charge in own if _is_of(source, charge)]
-        if isinstance(source, PointSource | VehicleSource) or not here_m:
+        is_drawn = any(_is_of(source, charge) for charge in own)
+        if isinstance(source, PointSource | VehicleSource) or not is_drawn:
             continue
-        for name, parts in buildings_of(scenario.structures).items():
-            walls = loaded_walls(parts)
-            if not walls:
-                continue
-            x_m, y_m = nearest_place(scenario, source, walls)
-            away_m, *here = least_distances_m(walls, np.array([(x_m, y_m), *here_m])).tolist()
+        here_m = [
+            charge.position_m
+            for charge in own
+            if charge.tnt_kg >= source.tnt_kg and charge.height_m <= source.height_m
+        ]
+        found = []
+        for name, walls in buildings:
+            place_m = nearest_place(scenario, source, walls)
+            away_m, *here = least_distances_m(walls, np.array([place_m, *here_m])).tolist()
             if min(here) > max(away_m + _NEARER_M, _NEARER * away_m):
-                yield (
-                    f"not among these: the nearest place of charge {number} ({source.tnt_kg:g} kg)"
-                    f" to {name}, {away_m:.1f} m away at ({x_m:.1f}, {y_m:.1f}) m; those here are"
-                    f" {min(here):.1f} m away or more"
-                )
+                found.append(_NearerPlace(name, away_m, place_m, min(here)))
+        street = f"charge {number} ({source.tnt_kg:g} kg)"
+        yield from _nearest_words(found, street, "those here")

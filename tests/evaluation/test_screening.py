@@ -351,10 +351,32 @@ def test_a_verdict_names_a_place_that_is_nearer_than_all_drawn_charges() -> None
     street = along_a_street(50.0, near, far)
     drawn = [Charge((x_m, 5.0), 50.0) for x_m in (25.0, 60.0)]
     (words,) = nearer_words(street, drawn)
-    assert "charge 1 (50 kg) to far, 15.0 m away at (105.0, 5.0) m" in words
+    assert "charge 1 (50 kg) to far, 15.0 m away at (105, 5) m" in words
     assert f"those here are {np.hypot(40.0, 15.0):.1f} m away or more" in words
     assert not [*nearer_words(street, [*drawn, Charge((100.5, 5.0), 50.0)])]
     assert not [*nearer_words(street, [Charge((60.0, 5.0), 4.0)])]  # another mass: the user's
+
+
+def test_nearer_places_are_one_sentence_for_each_street() -> None:
+    """Six buildings along a street had been five flags, and as many again for a street behind."""
+    keys = {"height_m": 4.0, "protected": True}
+    houses = [builders.block(f"h{k}", 20.0 * k + 10.0, 15.0, 10, 10, **keys) for k in range(6)]
+    near, behind = (
+        {"kind": "segment", "start_m": [2.0, y_m], "end_m": [138.0, y_m], "tnt_kg": 50.0}
+        for y_m in (5.0, 55.0)
+    )
+    site = builders.site("streets", (140.0, 60.0, 12.0), [near, behind], *houses)
+    drawn = [Charge((12.5, 5.0), 50.0), Charge((137.0, 55.0), 50.0)]
+    words = [*nearer_words(site, drawn)]
+    assert len(words) == 2
+    assert "charge 1 (50 kg) to h1, 10.0 m away" in words[0]
+    assert words[0].endswith("; so it is with h2, h3, h4, 1 more")
+    # The houses that a charge on the other street is as near to are not among those behind.
+    assert "charge 2 (50 kg) to h" in words[1]
+    assert "h0" not in words[1]
+    everywhere = [Charge((20.0 * k + 12.5, 5.0), 50.0) for k in range(6)]
+    assert not [*nearer_words(site, [*everywhere, drawn[1]])]
+    assert len([*nearer_words(site, [*(own._replace(tnt_kg=4.0) for own in everywhere), drawn[1]])])
 
 
 def test_requirements_name_one_scale() -> None:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.curves import Ways, in_the_open, normally_reflected
+from blast_env.evaluation.engines.gas_validation import bay_places
 from blast_env.evaluation.record import (
     BlastDetails,
     BlastLoads,
@@ -90,8 +91,8 @@ NO_AIR: Final = "no air touches its assessed walls: it has no load"
 """Note on a building that other structures or pieces hide."""
 
 _DOUBLED: Final = (
-    "peaks on walls farther than {:g} m from the charge are those of cells of {:g} m, and may be"
-    " too low: take uniform cells"
+    "peaks on bays farther than {:g} m from the charge are those of cells larger than {:g} m, and"
+    " may be too low: take uniform cells"
 )
 """Doubt about the peaks of cells that grow."""
 
@@ -338,16 +339,14 @@ def _unchecked(result: GasOutcome) -> Iterator[tuple[str, str]]:
 
 
 def _doubled_words(result: GasOutcome, structure: str) -> Iterator[str]:
-    """Yield that the wave comes to walls of a structure on cells that have doubled, if it does.
+    """Yield that the wave comes to bays of a structure on cells that have doubled, if it does.
 
     Peaks are sharpened by the smallest cells (`peak_factor`), which is too little there.
     """
-    doubled_m = result.run.settings.doubled_m
-    faces = result.on_walls[result.on_walls["structure"] == structure]
-    charge = result.run.site.charge
-    away_m = faces[["x_m", "y_m", "z_m"]].to_numpy(float) - (*charge.position_m, charge.height_m)
-    if doubled_m and np.linalg.norm(away_m, axis=1).max(initial=0.0) > doubled_m[0]:
-        yield _DOUBLED.format(doubled_m[0], 2.0 * result.run.grid.cell_m)
+    doubled_m, site = result.run.settings.doubled_m, result.run.site
+    bays = [own.bay for own in result.bay_loads.bays if own.bay.structure == structure]
+    if doubled_m and bay_places(site, bays).distance_m.max(initial=0.0) > doubled_m[0]:
+        yield _DOUBLED.format(doubled_m[0], result.run.grid.cell_m)
 
 
 def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
