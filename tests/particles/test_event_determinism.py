@@ -1,7 +1,6 @@
 """A run is the same to the last bit: in any process, cells, slices, and mirrored or turned."""
 
 import signal
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -284,7 +283,6 @@ def test_an_interrupted_run_goes_on_to_the_same_end() -> None:
     run.advance(1e-6)
     # An alarm of the system: a thread might wait for the processor until the run has ended.
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
-    began_s = time.perf_counter()
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.02)
         with pytest.raises(KeyboardInterrupt):
@@ -292,5 +290,5 @@ def test_an_interrupted_run_goes_on_to_the_same_end() -> None:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    assert time.perf_counter() - began_s < 2.0
+    assert run.steps < whole[1]  # at once, not at its end
     assert outcome(run) == whole
