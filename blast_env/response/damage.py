@@ -114,6 +114,8 @@ class TriangularLoads:
                 self._bays, peaks_pa, impulses_pa_s, strict=True
             )
         ]
+        if len(self._found) + len(asked) > _MOST_KEPT:  # a training meets ever new loads
+            self._found.clear()
         new = {
             key: bay
             for key, (_, bay, _) in zip(asked, self._bays, strict=True)
@@ -125,6 +127,9 @@ class TriangularLoads:
             self._found.update({key: own.damage for key, own in zip(new, made, strict=True)})
         return [self._found[key] for key in asked]
 
+
+_MOST_KEPT: Final = 20_000
+"""Most loads of which responses are kept: some megabytes."""
 
 _STATIC_S: Final = 0.5
 """Longest triangular load; longer ones have no further effect."""

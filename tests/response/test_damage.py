@@ -1,5 +1,6 @@
 """Damage of bays, houses and people: curves at points, limits, levels of protection."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -92,6 +93,19 @@ def test_bays_with_panes_of_one_name_respond_by_their_own_sizes() -> None:
     assert alone[0] != alone[1]
     together = TriangularLoads([small, large]).damages(6e3, 60.0)
     assert [found.damage for found in together] == alone
+
+
+def test_a_long_training_does_not_keep_every_response() -> None:
+    """It had kept those of all loads that it ever met."""
+    many = TriangularLoads([alternatives("window_annealed_6")] * 9_000)
+    sizes = []
+    for number in range(4):
+        peaks_pa = np.linspace(2e3, 3e4, 9_000) + number
+        first = many.damages(peaks_pa, 150.0)[0]
+        sizes.append(len(pickle.dumps(many)))
+    assert sizes[1] > 1.5 * sizes[0]
+    assert sizes[2] == pytest.approx(sizes[0], rel=0.02)
+    assert first == many.damages(peaks_pa, 150.0)[0]
 
 
 # --- Houses and people: the Green Book's curves at points, their limits, and levels of protection.
