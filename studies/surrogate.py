@@ -204,7 +204,7 @@ def fit_it(
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes over all blasts.")] = 30,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over all blasts.")] = 24,
     every: Annotated[int, typer.Option(min=2, help="One of so many sites is held out.")] = EVERY,
     seed: int = 0,
     device: Annotated[str, typer.Option(help="Device of torch.")] = "cpu",

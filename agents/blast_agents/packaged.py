@@ -44,7 +44,7 @@ WEIGHTS: Final = "packaged_agent.safetensors"
 FEW_DRAWS: Final = 3
 """Layouts that the agent draws for one proposal."""
 
-FEW_CHANGES: Final = 200
+FEW_CHANGES: Final = 100
 """Changes of the best guesses that one proposal looks at after that."""
 
 DRAWS: Final = 32

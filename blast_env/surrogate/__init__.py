@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from blast_env.surrogate.neighbours import TRAITS, piece_traits
     from blast_env.surrogate.network import (
         SHAPES,
+        SIGHT,
         Check,
         Fit,
         Guess,
@@ -32,6 +33,15 @@ if TYPE_CHECKING:
     from blast_env.surrogate.points import CLOSE, WIDE, Spacing, WallPoints
     from blast_env.surrogate.relations import RELATIONS, solid_relations
     from blast_env.surrogate.samples import Samples
+    from blast_env.surrogate.views import (
+        VIEW,
+        VIEW_ASIDE_M,
+        VIEW_BEHIND_M,
+        VIEW_BEYOND_M,
+        VIEW_MOST,
+        VIEW_STRETCHES,
+        solid_views,
+    )
     from blast_env.surrogate.walls import SurrogateSite, site_of
     from blast_env.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 else:
@@ -48,8 +58,15 @@ __all__ = [
     "RELATIONS",
     "SHAPES",
     "SHARES",
+    "SIGHT",
     "STATIONS",
     "TRAITS",
+    "VIEW",
+    "VIEW_ASIDE_M",
+    "VIEW_BEHIND_M",
+    "VIEW_BEYOND_M",
+    "VIEW_MOST",
+    "VIEW_STRETCHES",
     "WIDE",
     "Check",
     "Correction",
@@ -78,5 +95,6 @@ __all__ = [
     "predictions",
     "site_of",
     "solid_relations",
+    "solid_views",
     "stacked",
 ]

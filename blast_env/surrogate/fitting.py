@@ -21,6 +21,7 @@ from blast_env.surrogate.network import (
     MESSAGE,
     MOST_SPREADS,
     SHAPES,
+    SIGHT,
     AnyFloats,
     Fit,
     Member,
@@ -32,9 +33,10 @@ from blast_env.surrogate.network import (
 )
 from blast_env.surrogate.relations import RELATIONS
 from blast_env.surrogate.samples import Loads, Samples
+from blast_env.surrogate.views import HUNDREDTHS
 from blast_env.surrogate.ways import SHARES
 
-MEMBERS: Final = 5
+MEMBERS: Final = 4
 _BATCH: Final = 12
 """Groups of samples per update."""
 
@@ -47,7 +49,7 @@ _COMMON: Final = 0.2
 _AT_POINTS: Final = 1.0
 """Weight of the errors at points, where loads there are known, beside those of their means."""
 
-_RATE: Final = 1e-2
+_RATE: Final = 5e-3
 _DECAY: Final = 2e-2
 """Decay of weights: with a twentieth of it they grow, and networks say anything off their data."""
 
@@ -236,7 +238,12 @@ def _log_loads(
         )
         for which, own in enumerate((rows & ~is_piece, rows & is_piece))
     ]
-    differs = networks(surrogate.scaled(samples.features[points]), np.concatenate(heard, axis=2))
+    views = samples.views[samples.column[points]].astype(np.float32) / np.float32(HUNDREDTHS)
+    differs = networks(
+        surrogate.scaled(samples.features[points]),
+        np.concatenate(heard, axis=2),
+        (views[:, 0], views[:, 1]),
+    )
     known, area_m2 = loads.known[points], samples.area_m2[points]
     return log_loads(differs, known, area_m2, starts, loads.power)
 
@@ -356,6 +363,8 @@ class _Tensors:
         relations: The relations as they are: there are gigabytes of them (rows, RELATIONS).
         center: Mean of each relation (RELATIONS,).
         scale: Scale of each relation (RELATIONS,).
+        views: Views from each column of points, in hundredths (columns, 2, VIEW).
+        column: Index of the column of each point (points,).
         traits: Scaled traits (pieces, TRAITS).
         area_m2: Wall area represented by each point (points,).
         starts: Index of the first point of each sample (samples,).
@@ -369,6 +378,8 @@ class _Tensors:
     relations: Tensor
     center: Tensor
     scale: Tensor
+    views: Tensor
+    column: Tensor
     traits: Tensor
     area_m2: Tensor
     starts: IntArray
@@ -394,13 +405,21 @@ class _Tensors:
         )
         numbers = samples.counts, samples.counts * samples.solids, samples.pieces
         starts, rows, pieces = (np.cumsum([0, *counts[:-1]]) for counts in numbers)
-        of_all = features, relations, center, scales, traits, area_m2
+        views, column = (
+            torch.from_numpy(array).to(device) for array in (samples.views, samples.column)
+        )
+        of_all = features, relations, center, scales, views, column, traits, area_m2
         return cls(samples, *of_all, starts, rows, pieces, device)
 
     def related(self, rows: Tensor) -> Tensor:
         """Return the scaled relations of some rows (rows, RELATIONS)."""
         scaled = (self.relations[rows].float() - self.center) / self.scale
         return scaled.clamp_(-MOST_SPREADS, MOST_SPREADS)
+
+    def seen(self, points: Tensor, *, of_pieces: bool) -> Tensor:
+        """Return the views of structures, or of pieces, from some points (points, VIEW)."""
+        own = self.views[self.column[points], int(of_pieces)]
+        return own.float() / HUNDREDTHS
 
     def loss(
         self,
@@ -565,12 +584,13 @@ class _Stack(nn.Module):
         super().__init__()
         generator = torch.Generator().manual_seed(seed)
         arrays: list[Tensor] = []
-        # Weights and biases alternate; those of a layer are uniform up to 1 / sqrt(inputs).
-        for weights in SHAPES[::2]:
-            most = weights[0] ** -0.5
-            for shape in (weights, (1, weights[1])):
-                drawn = torch.rand((members, *shape), generator=generator)
-                arrays.append(most * (2.0 * drawn - 1.0))
+        # Weights of a layer, and biases after them, are uniform up to 1 / sqrt(inputs).
+        for shape in SHAPES:
+            if len(shape) > 1:
+                most = shape[0] ** -0.5
+            own = shape if len(shape) > 1 else (1, *shape)
+            drawn = torch.rand((members, *own), generator=generator)
+            arrays.append(most * (2.0 * drawn - 1.0))
         # At first all messages of pieces count about equally.
         arrays[Member._fields.index("weight_bias")].add_(_EVEN)
         self.layers = nn.ParameterList(arrays)
@@ -580,7 +600,7 @@ class _Stack(nn.Module):
         # (1) Each solid sends a message to each point; (2) their sum does not depend on their order
         # or number (Zaheer and others, Deep sets, NeurIPS 2017); (3) point and sums give the load.
         layers = [*self.layers]
-        first, first_bias, second, second_bias, last, last_bias = layers[12:]
+        view, piece_view, first, first_bias, second, second_bias, last, last_bias = layers[12:]
         structures = _two_layers(data.related(rows.structures), layers[:4])
         pieces = _two_layers(data.related(rows.related), layers[4:8])
         # Each message of a piece is weighted, number by number, by its traits.
@@ -589,12 +609,14 @@ class _Stack(nn.Module):
         heard = _sums(structures, rows.hearing_structures, len(rows.walls))
         also = _sums(pieces, rows.hearing_pieces, len(rows.behind))
         # The first layer's sums over what layouts have in common are made once.
-        sizes = [FEATURES - SHARES, SHARES, MESSAGE, MESSAGE]
-        constant, share, structure, piece = torch.split(first, sizes, dim=1)
+        sizes = [FEATURES - SHARES, SHARES, MESSAGE, MESSAGE, SIGHT, SIGHT]
+        constant, share, structure, piece, seen, seen_piece = torch.split(first, sizes, dim=1)
         walls = data.features[rows.walls][:, : FEATURES - SHARES]
         same = walls @ constant + heard @ structure + first_bias
+        same = same + data.seen(rows.walls, of_pieces=False) @ view @ seen
         shares = data.features[rows.behind][:, FEATURES - SHARES :] @ share
-        hidden = _silu(same.index_select(1, rows.wall) + shares + also @ piece)
+        of_view = data.seen(rows.behind, of_pieces=True) @ piece_view @ seen_piece
+        hidden = _silu(same.index_select(1, rows.wall) + shares + also @ piece + of_view)
         hidden = _silu(torch.baddbmm(second_bias, hidden, second))
         said: Tensor = torch.baddbmm(last_bias, hidden, last)[..., 0]
         return said
@@ -602,7 +624,10 @@ class _Stack(nn.Module):
     def plain(self) -> list[Member]:
         """Return the weights and biases of each network as arrays."""
         arrays = [layer.detach().cpu().numpy().astype(np.float64) for layer in self.layers]
-        single = [array[:, 0] if number % 2 else array for number, array in enumerate(arrays)]
+        single = [
+            array[:, 0] if len(shape) == 1 else array
+            for array, shape in zip(arrays, SHAPES, strict=True)
+        ]
         return [Member(*own) for own in zip(*single, strict=True)]
 
 

@@ -13,7 +13,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.compilation import compiled
@@ -40,7 +39,17 @@ from blast_env.surrogate.relations import (
     is_above,
     put_relations,
 )
-from blast_env.surrogate.rooms import BOOL, BYTE, FLOAT, SINGLE, Counts, Room
+from blast_env.surrogate.rooms import (
+    BOOL,
+    BYTE,
+    FLOAT,
+    INTEGER,
+    SINGLE,
+    Counts,
+    Numbers,
+    Room,
+)
+from blast_env.surrogate.views import ViewRoom, put_seen, put_seen_of
 from blast_env.surrogate.ways import (
     ASIDE_M,
     PLACES,
@@ -49,10 +58,6 @@ from blast_env.surrogate.ways import (
     put_shares_of,
     put_stopped_by,
 )
-
-Numbers = NDArray[np.int32]
-
-INTEGER: Final = np.dtype(np.int32)
 
 LEAST_OVER: Final = -8.0
 MOST_OVER: Final = 1.4
@@ -83,14 +88,16 @@ class NetworkLayers(NamedTuple):
         trait_bias: Its biases (members, width).
         weight: Weights of the second layer of these (members, width, length).
         weight_bias: Its biases (members, length).
-        constant: Weights of the first layer at points, of inputs that no layout changes and of the
-            messages of structures (members, n + length, width).
+        structure_view: Weights of views of structures (members, VIEW, sight).
+        piece_view: Weights of views of pieces (members, VIEW, sight).
+        constant: Weights of the first layer at points, of inputs that no layout changes, of the
+            messages of structures and of their views (members, n + length + sight, width).
         first_bias: Its biases (members, width).
-        first: Its weights of open shares and of the messages of pieces (members, SHARES + length,
-            width).
-        second: Weights of the second layer (members, width, width).
-        second_bias: Its biases (members, width).
-        last: Weights of the last layer (members, width).
+        first: Its weights of open shares, of the messages of pieces and of their views (members,
+            SHARES + length + sight, width).
+        second: Weights of the second layer (members, width, its own width).
+        second_bias: Its biases (members, its width).
+        last: Weights of the last layer (members, width of the second).
         last_bias: Its bias (members,).
         kinds: 0 for a network of impulses, 1 for one of peaks (members,).
         powers: Exponents of the means over the walls (members,).
@@ -108,6 +115,8 @@ class NetworkLayers(NamedTuple):
     trait_bias: SingleArray
     weight: SingleArray
     weight_bias: SingleArray
+    structure_view: SingleArray
+    piece_view: SingleArray
     constant: SingleArray
     first_bias: SingleArray
     first: SingleArray
@@ -141,22 +150,25 @@ class Pieces(NamedTuple):
         stopped: Number of paths that each stops (pieces, points, stations, asides).
         is_open: Whether the straight path is open (pieces, points).
         messages: Their messages (members, pieces, rows, length).
+        seen: What their views say (members, pieces, rows, sight).
     """
 
     boxes: FloatArray
     stopped: Counts
     is_open: BoolArray
     messages: SingleArray
+    seen: SingleArray
 
     @classmethod
     def in_room(cls, points: int, layers: NetworkLayers, room: Room, pieces: int) -> "Pieces":
         """Return arrays with any content."""
-        members, _, length = layers.message.shape
+        (members, _, length), sight = layers.message.shape, layers.piece_view.shape[2]
         return cls(
             room("boxes of pieces", (pieces, _BOX), FLOAT),
             room("stopped by pieces", (pieces, points, len(STATIONS), _ASIDES), BYTE),
             room("open behind pieces", (pieces, points), BOOL),
             room("messages of pieces", (members, pieces, whole(points), length), SINGLE),
+            room("views of pieces", (members, pieces, whole(points), sight), SINGLE),
         )
 
 
@@ -174,12 +186,14 @@ class Bench(NamedTuple):
         given: Open shares and messages of rows (n,).
         middle: Four rows between the layers of messages, or of their weights (n,).
         between: Four rows after the first layer (4, width).
-        beyond: The same after the second one (4, width).
+        beyond: The same after the second one (4, its width).
         parts: Parts of the sums of the last layer (4, PARTS).
         boxes: Boxes of the pieces of a layout (pieces, 5).
         traits: Their traits (pieces, TRAITS).
         told: Their scaled traits, one row after the other (n,).
         weights: The weights of their messages, by each member (n,).
+        view_room: Room for a view.
+        of_views: What the view of structures says (members, 1, rows, sight).
     """
 
     relations: FloatArray
@@ -198,6 +212,8 @@ class Bench(NamedTuple):
     traits: FloatArray
     told: SingleArray
     weights: SingleArray
+    view_room: ViewRoom
+    of_views: SingleArray
 
     @classmethod
     def in_room(
@@ -225,12 +241,14 @@ class Bench(NamedTuple):
             room("given", (rows * layers.first.shape[1],), SINGLE),
             room("middle", (ROWS_AT_ONCE * widest,), SINGLE),
             room("between", (ROWS_AT_ONCE, width), SINGLE),
-            room("beyond", (ROWS_AT_ONCE, width), SINGLE),
+            room("beyond", (ROWS_AT_ONCE, layers.second.shape[2]), SINGLE),
             room("parts", (ROWS_AT_ONCE, PARTS), SINGLE),
             room("boxes of a layout", (most, _BOX), FLOAT),
             room("traits of pieces", (most, TRAITS), FLOAT),
             room("told of pieces", (whole(most) * TRAITS,), SINGLE),
             room("weights of messages", (members * whole(most) * length,), SINGLE),
+            ViewRoom.in_room(room),
+            room("view of structures", (members, 1, rows, layers.piece_view.shape[2]), SINGLE),
         )
 
 
@@ -296,7 +314,9 @@ def put_charges(
         farthest_m: Largest distance of a point from each charge (charges,).
     """
     members, most, rows, length = room.messages.shape
+    sight = room.seen.shape[3]
     flat = room.messages.reshape(members * most * rows * length)
+    flat_seen = room.seen.reshape(members * most * rows * sight)
     for charge in range(len(asked.charges)):
         row = asked.charges[charge]
         start_m, scale_m, fall_m = row[:3], row[3], row[4]
@@ -308,8 +328,9 @@ def put_charges(
         first, last = asked.pieces[before], asked.pieces[after]
         count = last - first
         messages = flat[: members * count * rows * length].reshape((members, count, rows, length))
+        seen = flat_seen[: members * count * rows * sight].reshape((members, count, rows, sight))
         of_pieces = room.boxes[:count], room.stopped[:count], room.is_open[:count]
-        pieces = Pieces(*of_pieces, messages)
+        pieces = Pieces(*of_pieces, messages, seen)
         boxes = asked.boxes[first:last]
         put_pieces(boxes, start_m, scale_m, site.points, scales, layers, own, bench, pieces)
         for layout in range(before, after):
@@ -367,7 +388,10 @@ def put_charge(
     said = bench.of_structures
     sending = layers.send, layers.send_bias, layers.message, layers.message_bias
     _put_messages(own.relations, site.points, scales, sending, bench, said)
-    _put_base(own.features, scales, said, layers.constant, layers.first_bias, bench.constants, base)
+    seen, given = bench.of_views, bench.constants
+    bench.view_room.raster[:] = 0.0
+    put_seen(start_m, site.points, scale_m, solids, layers.structure_view, bench.view_room, seen, 0)
+    _put_base(own.features, scales, said, seen, layers.constant, layers.first_bias, given, base)
     return farthest_m
 
 
@@ -403,6 +427,11 @@ def put_pieces(
     first = layers.piece_send, layers.piece_send_bias
     sending = *first, layers.piece_message, layers.piece_message_bias
     _put_messages(relations, points, scales, sending, bench, found.messages)
+    bench.view_room.raster[:] = 0.0
+    views = layers.piece_view
+    for piece in range(len(boxes)):
+        box = boxes[piece : piece + 1]
+        put_seen(start_m, points, scale_m, box, views, bench.view_room, found.seen, piece)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -477,6 +506,7 @@ def _put_base(
     features: Any,
     scales: Scales,
     messages: Any,
+    seen: Any,
     weights: Any,
     bias: Any,
     given: Any,
@@ -485,7 +515,7 @@ def _put_base(
     """Put the sums of the first layer; see `put_charge`."""
     own_frame()
     members, rows, width = base.shape
-    solids, length = messages.shape[1], messages.shape[3]
+    solids, length, sight = messages.shape[1], messages.shape[3], seen.shape[3]
     constant, points, inputs = FEATURES - SHARES, len(features), given.shape[1]
     # The first layer is linear before its bend, so that the sums over inputs that no layout changes
     # are made once: W [c, s, m] = W_c c + W_s s + W_m m.
@@ -502,6 +532,8 @@ def _put_base(
                     entry = ((member * solids + solid) * rows + row) * length
                     heard = heard + load(said, entry + index)
                 store(at, row * inputs + constant + index, heard)
+            for index in range(sight):
+                given[row, constant + length + index] = seen[member, 0, row, index]
         weight, biases = place(weights[member]), place(bias[member])
         for row in range(0, rows, ROWS_AT_ONCE):
             end = (member * rows + row) * width
@@ -680,16 +712,18 @@ def put_loads(
     own_frame()
     starts, area_m2 = site.points.parts, site.points.area_m2
     members, rows, width = base.shape
-    points, given, length = len(area_m2), bench.given, new.messages.shape[3]
+    points, given = len(area_m2), bench.given
+    length, sight = new.messages.shape[3], new.seen.shape[3]
     at, to, beside = place(given), place(bench.between), place(bench.beyond)
     sums, weight_rows, same = place(bench.parts), 0, (0, 0, 0, 0)
+    beyond = layers.second.shape[2]
     loads = np.empty(len(starts))
     areas_m2 = _areas_m2(starts, area_m2)
     for layout in range(len(layouts)):
         own = layouts[layout]
         # Nothing is said without a piece: the sums over messages are left out.
         is_bare = own[0] == 0
-        inputs = SHARES if is_bare else SHARES + length
+        inputs = SHARES if is_bare else SHARES + length + sight
         _put_shares(own, charge, kept, new, scales, inputs, given)
         if not is_bare:
             weight_rows = _put_weights(
@@ -707,13 +741,14 @@ def put_loads(
                 if not is_bare:
                     by = member * weight_rows * length
                     _put_heard(own, member, row, inputs, kept.messages, new.messages, bench, by)
+                    put_seen_of(own, member, row, inputs, kept.seen, new.seen, given)
                 # 2. Four points through the layers, from memory read once.
                 bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
                 four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)
-                four_rows(to, 0, width, to_second, width, bias, same, beside, 0)
+                four_rows(to, 0, width, to_second, beyond, bias, same, beside, 0)
                 # 3. L = (sum of A L_i^p / sum of A)^(1 / p): p = 1 is the mean, a large p nearly
                 # the largest.
-                put_parts(beside, width, to_last, sums)
+                put_parts(beside, beyond, to_last, sums)
                 for number in range(min(ROWS_AT_ONCE, points - row)):
                     differs = np.float32(0.0)
                     for part in range(PARTS):

@@ -5,6 +5,7 @@ weighted, number by number, by how a piece stands to the others. The prediction 
 function of the features of the point and the sum of all messages.
 """
 
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -41,6 +42,7 @@ from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.pieces import PieceKnowledge, log_loads_of
 from blast_env.surrogate.relations import IN_PLAN, RELATIONS, RISING
 from blast_env.surrogate.rooms import Room, in_lines
+from blast_env.surrogate.views import VIEW
 from blast_env.surrogate.walls import SurrogateSite
 from blast_env.surrogate.ways import SHARES
 
@@ -57,11 +59,14 @@ _FEW: Final = 4
 _CELL_M: Final = GasSettings().cell_m
 """Side of the cells of the blasts that it is fitted to."""
 
-HIDDEN: Final = 64
-"""Width of the two hidden layers."""
+HIDDEN: Final = (96, 64)
+"""Widths of the two hidden layers."""
 
 MESSAGE: Final = 32
 """Length of a message, and width of its hidden layer."""
+
+SIGHT: Final = 48
+"""Length of what a view says."""
 
 IMPULSE_POWER: Final = 1.0
 """Exponent of the power mean over the walls for impulses: the arithmetic mean."""
@@ -78,12 +83,14 @@ MOST_SPREADS: Final = 4.0
 _SENDING: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,))
 _WEIGHING: Final = ((TRAITS, MESSAGE), *_SENDING[1:])
 
-SHAPES: Final = (*_SENDING, *_SENDING, *_WEIGHING) + (
-    (FEATURES + 2 * MESSAGE, HIDDEN),
-    (HIDDEN,),
-    (HIDDEN, HIDDEN),
-    (HIDDEN,),
-    (HIDDEN, 1),
+VIEWS: Final = ((VIEW, SIGHT), (VIEW, SIGHT))
+
+SHAPES: Final = (*_SENDING, *_SENDING, *_WEIGHING, *VIEWS) + (
+    (FEATURES + 2 * MESSAGE + 2 * SIGHT, HIDDEN[0]),
+    (HIDDEN[0],),
+    HIDDEN,
+    (HIDDEN[1],),
+    (HIDDEN[1], 1),
     (1,),
 )
 """Shapes of the arrays of a network, in the order of `Member`."""
@@ -129,7 +136,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[7] = 7
+    format: Literal[8] = 8
     command: str
     versions: dict[str, str]
     engine: str
@@ -271,6 +278,8 @@ class Member(NamedTuple):
     trait_bias: AnyFloats
     weight: AnyFloats
     weight_bias: AnyFloats
+    structure_view: AnyFloats
+    piece_view: AnyFloats
     first: AnyFloats
     first_bias: AnyFloats
     second: AnyFloats
@@ -323,24 +332,31 @@ class Networks:
         found: SingleArray = two_layers(given, *self._layers[first : first + len(_WEIGHING)])
         return found
 
-    def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
+    def __call__(
+        self, scaled: FloatArray, heard: SingleArray, seen: Sequence[AnyFloats]
+    ) -> FloatArray:
         """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
 
         Args:
             scaled: Features of points, less the mean, over the scale (points, FEATURES).
             heard: Sums of the messages of structures and of pieces to each point (members, points,
                 2 MESSAGE).
+            seen: The views of structures and of pieces from each point (points, VIEW).
 
         Returns:
             (members, points).
         """
         layers = self._layers
-        members, points, length = heard.shape
-        both = np.empty((members, points, FEATURES + length), dtype=np.float32)
-        both[..., :FEATURES], both[..., FEATURES:] = scaled, heard
+        members, points, _ = heard.shape
+        told = np.broadcast_to(scaled.astype(np.float32), (members, points, FEATURES))
+        weights = layers.structure_view, layers.piece_view
+        of_views = [
+            views.astype(np.float32) @ own for views, own in zip(seen, weights, strict=True)
+        ]
         # Two hidden layers, then a linear one to a single number per point.
+        inputs = np.concatenate((told, heard, *of_views), axis=2)
         second = two_layers(
-            both, layers.first, layers.first_bias, layers.second, layers.second_bias
+            inputs, layers.first, layers.first_bias, layers.second, layers.second_bias
         )
         found: FloatArray = np.einsum("mpi,mi->mp", second, layers.last[..., 0])
         return np.clip(found + layers.last_bias, LEAST_OVER, MOST_OVER)
@@ -353,8 +369,9 @@ class Networks:
             power: Exponent of the mean over the walls.
         """
         layers, members, length = self._layers, len(self.members), self._layers.message.shape[2]
-        constants, shares, structures, pieces = np.split(
-            layers.first, (FEATURES - SHARES, FEATURES, FEATURES + length), axis=1
+        ends = np.cumsum((FEATURES - SHARES, SHARES, length, length, SIGHT))
+        constants, shares, structures, pieces, seen, seen_pieces = np.split(
+            layers.first, ends, axis=1
         )
         # Sums over relations in plan are made first.
         in_order = np.concatenate((IN_PLAN, RISING))
@@ -362,9 +379,10 @@ class Networks:
             *(layers.send[:, in_order], *layers[1 : len(_SENDING)]),
             *(layers.piece_send[:, in_order], *layers[len(_SENDING) + 1 : 2 * len(_SENDING)]),
             *layers[2 * len(_SENDING) : 2 * len(_SENDING) + len(_WEIGHING)],
-            np.concatenate((constants, structures), axis=1),
+            *(layers.structure_view, layers.piece_view),
+            np.concatenate((constants, structures, seen), axis=1),
             layers.first_bias,
-            np.concatenate((shares, pieces), axis=1),
+            np.concatenate((shares, pieces, seen_pieces), axis=1),
             *(layers.second, layers.second_bias),
             np.ascontiguousarray(layers.last[..., 0]),
             np.ascontiguousarray(layers.last_bias[:, 0]),
@@ -558,7 +576,7 @@ class Surrogate:
         return guess._replace(impulse_pa_s=impulse_pa_s, peak_pa=peak_pa)
 
     def save(self, path: str | Path) -> Path:
-        """Write the surrogate as a JSON file, numbers to five digits.
+        """Write the surrogate as a JSON file, weights in half precision.
 
         Raises:
             BlastEnvError: If the file cannot be written.
@@ -568,8 +586,8 @@ class Surrogate:
             fit=self.fit,
             mean=_numbers(self.mean),
             scale=_numbers(self.scale),
-            members=_flat(self.impulse.members),
-            peak_members=_flat(self.peak.members),
+            members=_texts(self.impulse.members),
+            peak_members=_texts(self.peak.members),
         )
         with write_atomically(path) as temporary:
             temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
@@ -680,12 +698,16 @@ def packaged_surrogate() -> Surrogate:
     return load_surrogate(_PACKAGED)
 
 
-_Weight = Annotated[float, Field(ge=-1e3, le=1e3)]
-_Members = Annotated[list[list[list[_Weight]]], Field(min_length=1, max_length=100)]
+_HALF: Final = np.dtype("<f2")
+_MOST_WEIGHT: Final = 1e3
+_Members = Annotated[list[list[str]], Field(min_length=1, max_length=100)]
 
 
 class _File(BaseModel):
-    """Content of a file: arrays as flat lists."""
+    """Content of a file: the weights of each network as half-precision numbers in base64.
+
+    There are a hundred thousand in a network, and their rounding is far below its errors.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -700,23 +722,46 @@ class _File(BaseModel):
         for name, numbers in (("mean", self.mean), ("scale", self.scale)):
             if len(numbers) != INPUTS:
                 raise ValueError(f"{name} has {len(numbers)} numbers, must be {INPUTS}")
-        wanted = [prod(shape) for shape in SHAPES]
         for name, members in (("members", self.members), ("peak_members", self.peak_members)):
-            for number, member in enumerate(members):
-                sizes = [len(flat) for flat in member]
-                if sizes != wanted:
-                    raise ValueError(f"{name}: network {number} has {sizes}, must be {wanted}")
+            for number, texts in enumerate(members):
+                if len(texts) != len(SHAPES):
+                    raise ValueError(
+                        f"{name}: network {number} has {len(texts)} arrays, must be {len(SHAPES)}"
+                    )
+                for which, (text, shape) in enumerate(zip(texts, SHAPES, strict=True)):
+                    try:
+                        _array(text, shape)
+                    except ValueError as error:
+                        raise ValueError(
+                            f"{name}: network {number}, array {which}: {error}"
+                        ) from error
         return self
 
 
-def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
-    return [[_numbers(array) for array in member] for member in members]
+def _array(text: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return an array of its text.
+
+    Raises:
+        ValueError: If the text is no base64, or has other numbers.
+    """
+    content = b64decode(text, validate=True)
+    if len(content) != prod(shape) * _HALF.itemsize:
+        numbers = len(content) / _HALF.itemsize
+        raise ValueError(f"has {numbers:g} numbers, must be {prod(shape)}")
+    found = np.frombuffer(content, _HALF).astype(np.float64).reshape(shape)
+    if not (np.abs(found) <= _MOST_WEIGHT).all():
+        raise ValueError(f"a weight is beyond {_MOST_WEIGHT:g}, or no number")
+    return found
 
 
-def _member(flat: Sequence[Sequence[float]]) -> Member:
-    """Return a network from its flat lists."""
-    arrays = (np.array(item).reshape(shape) for item, shape in zip(flat, SHAPES, strict=True))
-    return Member(*arrays)
+def _texts(members: Sequence[Member]) -> list[list[str]]:
+    """Return the arrays of networks as text; see `_File`."""
+    return [[b64encode(array.astype(_HALF).tobytes()).decode() for array in own] for own in members]
+
+
+def _member(texts: Sequence[str]) -> Member:
+    """Return a network from its texts."""
+    return Member(*(_array(text, shape) for text, shape in zip(texts, SHAPES, strict=True)))
 
 
 def _numbers(array: AnyFloats) -> list[float]:

@@ -20,11 +20,9 @@ from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import ApproachArrays, charge_row, check_within_curves
 from blast_env.surrogate.layers import SingleArray, whole
 from blast_env.surrogate.loads import (
-    INTEGER,
     Bench,
     LoadRequest,
     NetworkLayers,
-    Numbers,
     Pieces,
     Scales,
     SiteArrays,
@@ -33,7 +31,7 @@ from blast_env.surrogate.loads import (
     put_loads,
     put_pieces,
 )
-from blast_env.surrogate.rooms import SINGLE, KeptRoom, Room, in_lines
+from blast_env.surrogate.rooms import INTEGER, SINGLE, KeptRoom, Numbers, Room, in_lines
 
 Box = tuple[float, ...]
 """Left, bottom, right, top and height of a piece, m."""
@@ -196,6 +194,7 @@ class PieceKnowledge:
             _with(kept.stopped, fresh.stopped[again], first),
             _with(kept.is_open, fresh.is_open[again], first),
             _with(kept.messages, fresh.messages[:, again], first, axis=1),
+            _with(kept.seen, fresh.seen[:, again], first, axis=1),
         )
         for number in again:
             del met[boxes[number]]

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.compilation import compiled
 
 RELATIONS: Final = 28
@@ -155,6 +155,13 @@ def is_above(points_m: FloatArray, outward: FloatArray, point: int) -> bool:
         ):
             return False
     return True
+
+
+def columns_of(points_m: FloatArray, outward: FloatArray) -> IntArray:
+    """Return the number of the column of each point: those above each other have one (points,)."""
+    starts = [not is_above(points_m, outward, point) for point in range(len(points_m))]
+    found: IntArray = np.cumsum(starts) - 1
+    return found
 
 
 @njit(error_model="numpy")

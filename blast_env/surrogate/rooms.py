@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Counts = NDArray[np.uint8]
+Numbers = NDArray[np.int32]
 Made = TypeVar("Made")
 
 FLOAT: Final = np.dtype(np.float64)
 SINGLE: Final = np.dtype(np.float32)
+INTEGER: Final = np.dtype(np.int32)
 BYTE: Final = np.dtype(np.uint8)
 BOOL: Final = np.dtype(np.bool_)
 

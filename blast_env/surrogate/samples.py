@@ -3,26 +3,31 @@
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import groupby
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.site import Scenario
 from blast_env.site.blast_site import Charge
+from blast_env.surrogate.approach import Approach
 from blast_env.surrogate.layers import HalfArray, SingleArray
 from blast_env.surrogate.neighbours import TRAITS
 from blast_env.surrogate.network import IMPULSE_POWER, PEAK_POWER
 from blast_env.surrogate.points import CLOSE, Spacing
-from blast_env.surrogate.relations import RELATIONS
-from blast_env.surrogate.walls import site_of
+from blast_env.surrogate.relations import RELATIONS, columns_of
+from blast_env.surrogate.rooms import BYTE, Counts
+from blast_env.surrogate.views import HUNDREDTHS, VIEW, solid_views
+from blast_env.surrogate.walls import SurrogateSite, site_of
 
-_BLOCK: Final = 2**20
-"""Rows of relations that are copied at once."""
+_BLOCK: Final = 2**24
+"""Numbers of relations, or of views, that are copied at once."""
 
 _UNKNOWN: Final = "[]"
 """Loads at points that were not recorded."""
@@ -60,6 +65,9 @@ class Samples:
         relations: Relations of solids to points, ordered by sample, solid and point, in half
             precision: there are gigabytes of them (rows, RELATIONS).
         traits: Traits of pieces, ordered by sample and piece (pieces, TRAITS).
+        views: Views of structures and of pieces from each column of points, in hundredths
+            (columns, 2, VIEW).
+        column: Index of the column of each point (points,).
         area_m2: Wall area represented by each point (points,).
         counts: Number of points of each sample (samples,).
         solids: Number of structures and pieces of each sample (samples,).
@@ -75,6 +83,8 @@ class Samples:
     features: FloatArray
     relations: HalfArray
     traits: FloatArray
+    views: Counts
+    column: IntArray
     area_m2: FloatArray
     counts: np.ndarray
     solids: np.ndarray
@@ -115,11 +125,15 @@ class Samples:
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         # 1. The points of each structure: a sample. Relations are copied at once.
-        samples, related = [], _Rows()
-        for sample, relations in _samples(rows, scenarios, spacing):
+        samples = []
+        related, seen = _Rows(np.dtype(np.float16), RELATIONS), _Rows(BYTE, 2 * VIEW)
+        for sample, relations, views_of in _samples(rows, scenarios, spacing):
             samples.append(sample)
             related.add(relations)
-        features, traits, area_m2, solids, structures, impulses, peaks = zip(*samples, strict=True)
+            seen.add(views_of)
+        features, traits, area_m2, solids, structures, impulses, peaks, columns = zip(
+            *samples, strict=True
+        )
         # 2. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         counts = np.array([len(feature) for feature in features])
@@ -132,6 +146,8 @@ class Samples:
             features=np.concatenate(features),
             relations=related.joined(),
             traits=np.concatenate([own.reshape(-1, TRAITS) for own in traits]),
+            views=seen.joined().reshape(-1, 2, VIEW),
+            column=_numbered(columns),
             area_m2=np.concatenate(area_m2),
             counts=counts,
             solids=np.array(solids),
@@ -165,20 +181,21 @@ class _Sample(NamedTuple):
     structures: int
     log_impulse: FloatArray
     log_peak: FloatArray
+    column: IntArray
 
 
 def _samples(
     rows: pd.DataFrame, scenarios: dict[str, Scenario], spacing: Spacing
-) -> Iterator[tuple[_Sample, FloatArray]]:
-    """Yield the sample of each row, with its relations (solids, points, RELATIONS)."""
-    # 1. Each site once; each blast once, with the features of all points of its walls.
-    hashes = rows["scenario_hash"].unique()
-    sites = {name: site_of(scenarios[name], spacing=spacing) for name in hashes}
+) -> Iterator[tuple[_Sample, FloatArray, FloatArray]]:
+    """Yield the sample of each row, its relations (solids, points, RELATIONS), and its views."""
+    # 1. Each blast once, with the features of all points of its walls. Blasts on one site follow
+    # each other, and thousands of sites would take gigabytes.
+    site_at = lru_cache(maxsize=1)(lambda name: site_of(scenarios[name], spacing=spacing))
     wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
     columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
     of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
     for (scenario_hash, layout, *numbers), loads in of_blast:
-        site = sites[scenario_hash]
+        site = site_at(scenario_hash)
         x_m, y_m, height_m, tnt_kg = map(float, numbers)
         approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
         barrier = site.barrier(elements(layout))
@@ -197,33 +214,58 @@ def _samples(
                 len(approach.solids),
                 approach.log_impulse[own],
                 approach.log_peak[own],
+                columns_of(approach.ways.points_m[own], approach.outward[own]),
             )
-            yield sample, relations[:, own]
+            yield sample, relations[:, own], _views(site, approach, barrier, own)
+
+
+def _views(site: SurrogateSite, approach: Approach, barrier: FloatArray, own: slice) -> FloatArray:
+    """Return the views of structures and pieces from columns of points (columns, 2, VIEW)."""
+    ways = approach.ways
+    where = ways.start_m, ways.points_m[own], approach.outward[own], approach.scale_m
+    seen = np.stack(
+        [solid_views(*where, solids) for solids in (site.arrays.solids, barrier)], axis=1
+    )
+    return np.rint(seen * HUNDREDTHS)
+
+
+def _numbered(columns: Iterable[IntArray]) -> IntArray:
+    """Return the columns of the points of all samples, numbered one after the other (points,)."""
+    found, first = [], 0
+    for own in columns:
+        found.append(own + first)
+        first += own[-1] + 1
+    return np.concatenate(found)
 
 
 class _Rows:
-    """Relations one after the other, in blocks: there are gigabytes of them.
+    """Numbers of samples one after the other, in blocks: there are gigabytes of them.
 
     Many small arrays would leave as much memory behind as they took, so they are copied early.
+
+    Args:
+        dtype: Type in which they are kept.
+        width: Numbers of a row.
     """
 
-    def __init__(self) -> None:
-        self._blocks: list[HalfArray] = []
-        self._parts: list[HalfArray] = []
+    def __init__(self, dtype: np.dtype[Any], width: int) -> None:
+        self._dtype, self._width = dtype, width
+        self._blocks: list[NDArray[Any]] = []
+        self._parts: list[NDArray[Any]] = []
         self._count = 0
 
-    def add(self, relations: FloatArray) -> None:
-        """Add the relations of solids to the points of a sample (solids, points, RELATIONS)."""
-        self._parts.append(relations.astype(np.float16).reshape(-1, RELATIONS))
-        self._count += len(self._parts[-1])
+    def add(self, numbers: FloatArray) -> None:
+        """Add the rows of a sample."""
+        self._parts.append(numbers.astype(self._dtype).reshape(-1, self._width))
+        self._count += self._parts[-1].size
         if self._count >= _BLOCK:
             self._end_block()
 
-    def joined(self) -> HalfArray:
-        """Return all of them (rows, RELATIONS), and forget them."""
+    def joined(self) -> NDArray[Any]:
+        """Return all of them (rows, width), and forget them."""
         self._end_block()
         rows = sum(map(len, self._blocks))
-        found, first = np.empty((rows, RELATIONS), dtype=np.float16), 0
+        found, first = np.empty((rows, self._width), self._dtype), 0
         self._blocks.reverse()
         while self._blocks:
             block = self._blocks.pop()
