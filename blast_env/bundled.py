@@ -26,13 +26,27 @@ COURT_SITES: Final = "court_sites"
 SQUARE_SITES: Final = "square_sites"
 """Name of short fronts on open ground, of any size."""
 
+LOW_SITES: Final = "low_sites"
+"""Name of buildings of one storey, as low as the walls before them, of any size."""
+
+LANE_SITES: Final = "lane_sites"
+"""Name of lanes between short fronts, along which a vehicle drives, of any size."""
+
 HEADROOM_SITES: Final = "headroom_sites"
 """Name of those of the sites on which layouts are ahead of all rules."""
 
 GENERATED: Final = (SITES, ITEM_SITES, LARGE_SITES)
 """Those of an environment: all sites of a name have one size."""
 
-OF_ANY_SIZE: Final = (KERB_SITES, STREET_SITES, COURT_SITES, SQUARE_SITES, HEADROOM_SITES)
+OF_ANY_SIZE: Final = (
+    KERB_SITES,
+    STREET_SITES,
+    COURT_SITES,
+    SQUARE_SITES,
+    LOW_SITES,
+    LANE_SITES,
+    HEADROOM_SITES,
+)
 """Those whose sites differ in size and catalogue."""
 
 

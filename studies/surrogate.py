@@ -85,9 +85,9 @@ def blasts(
     kind: Annotated[
         str,
         typer.Option(
-            help="sites, item_sites, kerb_sites, street_sites, court_sites, square_sites, or with "
-            "their side in m: close_sites/18, large_sites/60, front_sites/18 (only walls count "
-            "that the blast comes from)."
+            help="sites, item_sites, kerb_sites, street_sites, court_sites, square_sites, "
+            "low_sites, lane_sites, or with their side in m: close_sites/18, large_sites/60, "
+            "front_sites/18 (only walls count that the blast comes from)."
         ),
     ] = ITEM_SITES,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,

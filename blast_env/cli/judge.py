@@ -62,7 +62,7 @@ _ScenarioOption = Annotated[
     typer.Option(
         help="Your own site in the place of problems: a file, a bundled name, or for generated "
         "ones sites, item_sites, large_sites, kerb_sites, street_sites, court_sites, "
-        "square_sites or headroom_sites; may be given again.",
+        "square_sites, low_sites, lane_sites or headroom_sites; may be given again.",
     ),
 ]
 _ThreatOption = Annotated[

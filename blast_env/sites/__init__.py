@@ -30,6 +30,8 @@ if TYPE_CHECKING:
         KerbSiteRanges,
         court_site,
         kerb_site,
+        lane_site,
+        low_site,
         square_site,
         street_site,
     )
@@ -73,7 +75,9 @@ __all__ = [
     "generate_site",
     "headroom_site",
     "kerb_site",
+    "lane_site",
     "large_ranges",
+    "low_site",
     "square_site",
     "street_site",
     "training_sites",

@@ -60,6 +60,18 @@ SQUARE_ACROSS_M: Final[Span] = (10.0, 20.0)
 SQUARE_ALONG_M: Final[Span] = (14.0, 26.0)
 """Least and largest size across that, m."""
 
+LOW_ACROSS_M: Final[Span] = (11.0, 18.0)
+"""Least and largest size of a site of low buildings from the kerb to behind the front, m."""
+
+LOW_ALONG_M: Final[Span] = (12.0, 22.0)
+"""Least and largest size across that, m."""
+
+LANE_ACROSS_M: Final[Span] = (9.0, 13.0)
+"""Least and largest size of a lane from behind one front to behind the other, m."""
+
+LANE_ALONG_M: Final[Span] = (16.0, 26.0)
+"""Least and largest size along the lane, m."""
+
 _HEIGHTS_M: Final = (0.8, 1.0, 1.0, 1.4, 2.0, 2.0, 2.5, 3.0, 3.6, 3.6, 4.0)
 """Heights of pieces of the catalogue and of T-walls."""
 
@@ -269,6 +281,65 @@ def square_site(seed: int) -> Scenario:
         vehicle_probability=0.5,
         kerb_m=(0.0, 4.0),
         zone_from_charge_m=(0.5, 2.0),
+    )
+    return generate_site(seed, ranges)
+
+
+def low_site(seed: int) -> Scenario:
+    """Return the site of a seed with buildings of one storey, as low as the walls before them.
+
+    A wall close to such a front shuts it off, and the blast comes round the ends of both.
+
+    Args:
+        seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
+    """
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 4)))
+    across_m, along_m = draws.length_m(LOW_ACROSS_M), draws.length_m(LOW_ALONG_M)
+    ranges = KerbSiteRanges(
+        across_m=across_m,
+        along_m=along_m,
+        tnt_kg=(40.0, 150.0),
+        front_height_m=(2.5, 4.5),
+        front_share=(0.25, 0.6),
+        second_probability=0.7,
+        opposite_probability=0.25,
+        wing_probability=0.0,
+        places=(2, 3),
+        vehicle_probability=0.2,
+        kerb_m=(2.0, 6.0),
+    )
+    return generate_site(seed, ranges)
+
+
+def lane_site(seed: int) -> Scenario:
+    """Return the site of a seed where a vehicle drives along a lane between two short fronts.
+
+    Who keeps it away from the front has it before the mouth of the lane, with a wall between.
+
+    Args:
+        seed: As for `generate_site`.
+
+    Raises:
+        BlastEnvError: As `generate_site`.
+    """
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 5)))
+    across_m, along_m = draws.length_m(LANE_ACROSS_M), draws.length_m(LANE_ALONG_M)
+    ranges = KerbSiteRanges(
+        across_m=across_m,
+        along_m=along_m,
+        tnt_kg=(40.0, 150.0),
+        depth_m=(2.0, 3.0),
+        front_share=(0.2, 0.45),
+        second_probability=0.2,
+        opposite_probability=1.0,
+        opposite_m=(2.0, 3.0),
+        wing_probability=0.0,
+        vehicle_probability=1.0,
+        kerb_m=(0.0, 2.0),
+        zone_from_charge_m=(0.5, 1.0),
     )
     return generate_site(seed, ranges)
 

@@ -13,7 +13,9 @@ from blast_env.bundled import (
     HEADROOM_SITES,
     ITEM_SITES,
     KERB_SITES,
+    LANE_SITES,
     LARGE_SITES,
+    LOW_SITES,
     SITES,
     SQUARE_SITES,
     STREET_SITES,
@@ -24,7 +26,14 @@ from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import HELD_OUT_SITES, RANGES, generate_site
 from blast_env.sites.headroom_sites import headroom_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
-from blast_env.sites.kerb_sites import court_site, kerb_site, square_site, street_site
+from blast_env.sites.kerb_sites import (
+    court_site,
+    kerb_site,
+    lane_site,
+    low_site,
+    square_site,
+    street_site,
+)
 from blast_env.sites.ranges import Ranges
 from blast_env.values import MOST_SEED
 
@@ -40,6 +49,8 @@ SITE_KINDS: Final[Mapping[str, Callable[[int], Scenario]]] = MappingProxyType(
         STREET_SITES: street_site,
         COURT_SITES: court_site,
         SQUARE_SITES: square_site,
+        LOW_SITES: low_site,
+        LANE_SITES: lane_site,
         HEADROOM_SITES: headroom_site,
     }
 )

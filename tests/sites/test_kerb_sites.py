@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
@@ -12,6 +13,8 @@ from blast_env.sites import (
     court_site,
     generate_site,
     kerb_site,
+    lane_site,
+    low_site,
     square_site,
     street_site,
 )
@@ -109,3 +112,27 @@ def test_on_squares_charges_may_go_off_past_the_ends_of_short_fronts() -> None:
         for front in fronts:
             _, bottom, _, top = front.rectangle_m
             assert top - bottom <= 0.5 * site.site.height_m + 0.5
+
+
+def test_walls_of_the_stock_may_be_as_tall_as_low_buildings() -> None:
+    margins_m = []
+    for site in map(low_site, SEEDS[:4]):
+        assert site.build_zone is not None
+        tall_m = max(item.height_m for item in site.build_zone.items)
+        fronts_m = [own.height_m or 0.0 for own in site.structures if own.protected]
+        assert 2.5 <= min(fronts_m) <= max(fronts_m) <= 4.5
+        margins_m.append(tall_m - min(fronts_m))
+    assert max(margins_m) >= 0.0
+
+
+def test_a_vehicle_in_a_lane_may_come_past_both_ends_of_short_fronts() -> None:
+    for site in map(lane_site, SEEDS[:3]):
+        (vehicle,) = site.vehicles
+        (lane,) = vehicle.drivable
+        along = int(np.argmax(lane.size_m))
+        start_m, length_m = lane.corner_m[along], lane.size_m[along]
+        for structure in site.structures:
+            low_m, high_m = (structure.rectangle_m[number] for number in (along, along + 2))
+            assert start_m <= low_m
+            assert high_m <= start_m + length_m
+            assert high_m - low_m <= 0.45 * length_m + 0.5
