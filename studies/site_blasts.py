@@ -20,11 +20,16 @@ from blast_env.provenance import versions
 from blast_env.site import AnyStructure, Scenario
 from blast_env.surrogate import WallPoints
 from blast_env.tables import table_of
-from studies.blast_table import BLAST, COLUMNS, joined, load_row, named
+from studies.blast_table import (
+    BLAST,
+    COLUMNS,
+    UNKNOWN,
+    joined,
+    load_row,
+    named,
+    text_at_points,
+)
 from studies.site_names import scenario_of
-
-_DIGITS: Final = 4
-"""Significant digits of the loads at points."""
 
 _TURNED_M2: Final = 1e6
 """Penalty on a point whose wall is turned away from a face, m2."""
@@ -150,12 +155,7 @@ def _nearest(walls: pd.DataFrame, points: WallPoints, own: slice) -> IntArray:
 
 
 def _texts(loads: PointLoads | None) -> tuple[str, str]:
-    """Return the loads at points as JSON, in `_DIGITS` digits; null where there is none."""
+    """Return impulses and peaks at points as JSON."""
     if loads is None:
-        return "[]", "[]"
-    both = (
-        [float(f"{load:.{_DIGITS}g}") if np.isfinite(load) else None for load in own]
-        for own in loads
-    )
-    first, second = (json.dumps(own, separators=(",", ":")) for own in both)
-    return first, second
+        return UNKNOWN, UNKNOWN
+    return text_at_points(loads.impulse_pa_s.tolist()), text_at_points(loads.peak_pa.tolist())

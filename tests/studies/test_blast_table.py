@@ -147,7 +147,7 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
     assert len(impulses) == len(peaks) == len(points.area_m2)
     # Their mean by area is the load on the structure, but for faces that are halved by a border.
     assert np.average(impulses, weights=points.area_m2) == pytest.approx(loads["hotel"], rel=0.02)
-    assert max(peaks) == pytest.approx(hotel["peak_pa"], rel=1e-3)
+    assert max(peaks) == pytest.approx(hotel["peak_pa"], rel=5e-3)
     other = found[found["structure"] != "hotel"]
     assert set(other["point_impulses_pa_s"]) <= {"[]"}
     monkeypatch.setattr(GasBlast, "run", None)
@@ -155,7 +155,7 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
 
 
 def test_tables_are_joined_and_rows_with_loads_at_points_win(tmp_path: Path) -> None:
-    known = old_rows([WALL, "[]"]).assign(point_impulses_pa_s="[1.0]")
+    known = old_rows([WALL, "[]"]).assign(point_impulses_pa_s="[1.0,1234.5,0.0345678,null]")
     tables, folder = [old_rows([WALL]), known], tmp_path / "sites"
     folder.mkdir()
     for number, table in enumerate(tables):
@@ -165,6 +165,7 @@ def test_tables_are_joined_and_rows_with_loads_at_points_win(tmp_path: Path) -> 
     assert (code, words.split(";")[0]) == (0, "2 blasts")
     found = read_frame(out, COLUMNS)
     assert found["layout"].tolist() == [WALL, "[]"]
-    assert set(found["point_impulses_pa_s"]) == {"[1.0]"}
+    # Loads at points are kept with three digits.
+    assert set(found["point_impulses_pa_s"]) == {"[1,1230,0.0346,null]"}
     assert run(tmp_path / "none", "--out", out)[0] == 2
     assert blast_table.joined([table.iloc[:0] for table in tables]).empty
