@@ -20,8 +20,8 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.cli.output import user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.surrogate import Surrogate, packaged_surrogate
-from blast_env.surrogate.fitting import Predictions, errors_of, folds
-from blast_env.surrogate.network import Check
+from blast_env.surrogate.fit_record import Check
+from blast_env.surrogate.holdout import Predictions, errors_of, folds
 from blast_env.surrogate.samples import Samples
 from blast_env.tables import markdown_table
 from studies.surrogate import DATA, EVERY, named_rows, samples_of

@@ -15,8 +15,9 @@ from blast_env.answers.terminal import print_line
 from blast_env.arrays import BoolArray
 from blast_env.cli.output import progress_bar, user_errors
 from blast_env.provenance import versions
-from blast_env.surrogate.fitting import fit, folds, load_errors
-from blast_env.surrogate.network import Fit
+from blast_env.surrogate.fit_record import Fit
+from blast_env.surrogate.fitting import fit
+from blast_env.surrogate.holdout import folds, load_errors
 from blast_env.surrogate.samples import Samples
 from blast_env.tables import markdown_table
 from studies.surrogate import DATA, EVERY, named_rows, samples_of

@@ -35,14 +35,10 @@ from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import ITEM_SITES
 from blast_env.statistics import mean_estimate, reductions
-from blast_env.surrogate.fitting import (
-    Errors,
-    Predictions,
-    errors_of,
-    fit,
-    folds,
-    predictions,
-)
+from blast_env.surrogate.ensemble import Surrogate
+from blast_env.surrogate.fit_record import Check, Fit
+from blast_env.surrogate.fitting import fit
+from blast_env.surrogate.holdout import Errors, Predictions, errors_of, folds, predictions
 from blast_env.surrogate.intervals import (
     COVERAGE,
     IMPULSE_LEAST_SPREAD,
@@ -52,9 +48,10 @@ from blast_env.surrogate.intervals import (
     least_sites,
     widened,
 )
-from blast_env.surrogate.network import Check, Fit, Networks, Surrogate, load_surrogate
+from blast_env.surrogate.network import Networks
 from blast_env.surrogate.points import CLOSE, WIDE, Spacing
 from blast_env.surrogate.samples import Loads, Samples
+from blast_env.surrogate.surrogate_file import load_surrogate, save_surrogate
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS
@@ -251,7 +248,7 @@ def fit_it(
         about = about.model_copy(
             update={"seconds": seconds, "impulse": impulse.check, "peak": peak.check}
         )
-        path = replace(fitted, fit=about).save(out)
+        path = save_surrogate(replace(fitted, fit=about), out)
         print_line(f"\n{about.blasts:,} loads of {about.sites:,} sites; wrote {path}")
 
 

@@ -38,7 +38,7 @@ def test_engines_import_neither_pandas_nor_numba_before_a_blast() -> None:
 
 def test_guesses_need_no_torch() -> None:
     modules = modules_after("import blast_env.surrogate as room; room.packaged_surrogate()")
-    assert "blast_env.surrogate.network" in modules
+    assert "blast_env.surrogate.ensemble" in modules
     assert not {"torch", "pandas"} & modules
 
 

@@ -8,31 +8,22 @@ if TYPE_CHECKING:
     from blast_env.surrogate.approach import FEATURES, INPUTS
     from blast_env.surrogate.correction import Correction, apart_m3, stacked
     from blast_env.surrogate.engine import SurrogateEngine
-    from blast_env.surrogate.fitting import (
-        MEMBERS,
-        Predictions,
-        fit,
-        folds,
-        load_errors,
-        predictions,
-    )
+    from blast_env.surrogate.ensemble import Surrogate
+    from blast_env.surrogate.fit_record import Check, Fit
+    from blast_env.surrogate.fitting import MEMBERS, fit
+    from blast_env.surrogate.guess import Guess
+    from blast_env.surrogate.holdout import Predictions, folds, load_errors, predictions
     from blast_env.surrogate.intervals import COVERAGE, covered, interval_factor, least_sites
     from blast_env.surrogate.neighbours import TRAITS, piece_traits
-    from blast_env.surrogate.network import (
-        SHAPES,
-        SIGHT,
-        Check,
-        Fit,
-        Guess,
-        Member,
-        Networks,
-        Surrogate,
-        load_surrogate,
-        packaged_surrogate,
-    )
+    from blast_env.surrogate.network import SHAPES, SIGHT, Member, Networks
     from blast_env.surrogate.points import CLOSE, WIDE, Spacing, WallPoints
     from blast_env.surrogate.relations import RELATIONS, solid_relations
     from blast_env.surrogate.samples import Samples
+    from blast_env.surrogate.surrogate_file import (
+        load_surrogate,
+        packaged_surrogate,
+        save_surrogate,
+    )
     from blast_env.surrogate.views import (
         VIEW,
         VIEW_ASIDE_M,
@@ -93,6 +84,7 @@ __all__ = [
     "packaged_surrogate",
     "piece_traits",
     "predictions",
+    "save_surrogate",
     "site_of",
     "solid_relations",
     "solid_views",

@@ -16,8 +16,10 @@ from blast_env.evaluation.validation import Validation, ValidationStatus
 from blast_env.geometry import Element
 from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
-from blast_env.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
+from blast_env.surrogate.ensemble import Surrogate
+from blast_env.surrogate.guess import Guess
 from blast_env.surrogate.pieces import Memory
+from blast_env.surrogate.surrogate_file import load_surrogate, packaged_surrogate
 from blast_env.surrogate.walls import SurrogateSite, site_of
 
 SURROGATE: Final = "surrogate"

@@ -19,18 +19,15 @@ from blast_env.arrays import FloatArray
 from blast_env.site.blast_site import Charge
 from blast_env.surrogate.approach import ApproachArrays, charge_row, check_within_curves
 from blast_env.surrogate.layers import SingleArray, whole
-from blast_env.surrogate.loads import (
+from blast_env.surrogate.load_arrays import (
     Bench,
     LoadRequest,
     NetworkLayers,
     Pieces,
     Scales,
     SiteArrays,
-    put_charge,
-    put_charges,
-    put_loads,
-    put_pieces,
 )
+from blast_env.surrogate.loads import put_charge, put_charges, put_loads, put_pieces
 from blast_env.surrogate.rooms import INTEGER, SINGLE, KeptRoom, Numbers, Room, in_lines
 
 Box = tuple[float, ...]

@@ -87,12 +87,9 @@ def put_relations(
     for point in range(len(points_m)):
         is_higher = is_above(points_m, outward, point)
         # 1. The axes of a point: ahead along the path in plan, aside to where its wall faces.
-        x_m, y_m = points_m[point, 0] - start_m[0], points_m[point, 1] - start_m[1]
-        way_m = sqrt(x_m * x_m + y_m * y_m) + 1e-6
-        ahead_x, ahead_y = x_m / way_m, y_m / way_m
-        aside_x, aside_y = -ahead_y, ahead_x
-        if outward[point, 0] * aside_x + outward[point, 1] * aside_y < 0.0:
-            aside_x, aside_y = -aside_x, -aside_y
+        way_m, (ahead_x, ahead_y), (aside_x, aside_y) = axes_of(
+            start_m, points_m[point], outward[point]
+        )
         for solid in range(len(solids)):
             # 2. Where its centre is along these axes, where it is abreast of the path, and how high
             # the straight path is there.
@@ -141,6 +138,26 @@ def put_relations(
             over_m = height_m - straight_m
             own[7] = min(max(over_m / scale_m, -_MOST), _MOST)
             own[12] = min(_detour_m(there_m, way_m, max(over_m, 0.0)) / scale_m, _MOST)
+
+
+@njit(error_model="numpy")
+def axes_of(
+    start_m: FloatArray, point_m: FloatArray, outward: FloatArray
+) -> tuple[float, tuple[float, float], tuple[float, float]]:
+    """Return the length of the straight path in plan, m, and the axes ahead and aside.
+
+    Args:
+        start_m: Position of the charge (3,).
+        point_m: The point (3,).
+        outward: Outward normal of its wall, in plan (2,).
+    """
+    x_m, y_m = point_m[0] - start_m[0], point_m[1] - start_m[1]
+    way_m = sqrt(x_m * x_m + y_m * y_m) + 1e-6
+    ahead_x, ahead_y = x_m / way_m, y_m / way_m
+    aside_x, aside_y = -ahead_y, ahead_x
+    if outward[0] * aside_x + outward[1] * aside_y < 0.0:
+        aside_x, aside_y = -aside_x, -aside_y
+    return way_m, (ahead_x, ahead_y), (aside_x, aside_y)
 
 
 @njit(error_model="numpy")

@@ -7,7 +7,7 @@ solids. So the first layer of a network, which is linear, hears of each solid by
 by messages.
 """
 
-from math import ceil, floor, sqrt
+from math import ceil, floor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from blast_env.gas.simd import fill, get, lanes_at, load, own_frame, place, stor
 from blast_env.gas.state import FUSED
 from blast_env.surrogate.layers import ROWS_AT_ONCE, SingleArray
 from blast_env.surrogate.points import WallPoints
-from blast_env.surrogate.relations import is_above
+from blast_env.surrogate.relations import axes_of, is_above
 from blast_env.surrogate.rooms import FLOAT, INTEGER, SINGLE, Numbers, Room
 from blast_env.surrogate.ways import REFERENCE_KG
 
@@ -157,12 +157,7 @@ def put_view(
 ) -> None:
     """Add a solid to the view from a point (VIEW,); see `solid_views`."""
     # 1. The axes: ahead along the way in plan, aside to where the wall faces, as of relations.
-    x_m, y_m = point_m[0] - start_m[0], point_m[1] - start_m[1]
-    way_m = sqrt(x_m * x_m + y_m * y_m) + 1e-6
-    ahead_x, ahead_y = x_m / way_m, y_m / way_m
-    aside_x, aside_y = -ahead_y, ahead_x
-    if outward[0] * aside_x + outward[1] * aside_y < 0.0:
-        aside_x, aside_y = -aside_x, -aside_y
+    way_m, (ahead_x, ahead_y), (aside_x, aside_y) = axes_of(start_m, point_m, outward)
     # 2. The solid in parts, each in the cell of its centre.
     by = _REFERENCE_SCALE / scale_m
     wide_m, deep_m = solid[2] - solid[0], solid[3] - solid[1]

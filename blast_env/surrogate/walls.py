@@ -22,7 +22,7 @@ from blast_env.site.facade import BayComponents
 from blast_env.site.structures import ground_below_m, is_open_below
 from blast_env.surrogate.approach import Approach, curves
 from blast_env.surrogate.hiding import Gaps
-from blast_env.surrogate.loads import SiteArrays
+from blast_env.surrogate.load_arrays import SiteArrays
 from blast_env.surrogate.neighbours import piece_traits
 from blast_env.surrogate.pieces import Box, Memory
 from blast_env.surrogate.points import CLOSE, WIDE, Spacing, WallPoints

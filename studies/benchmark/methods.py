@@ -26,8 +26,7 @@ from blast_env.evaluation import LoadCaseSet
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnySource, Scenario
 from blast_env.site.sources import source_of
-from blast_env.surrogate import SurrogateEngine
-from blast_env.surrogate.network import packaged_surrogate
+from blast_env.surrogate import SurrogateEngine, packaged_surrogate
 from blast_env.values import generator
 from studies.benchmark.family import SuggestionView, trained
 

@@ -64,6 +64,7 @@ from blast_env.surrogate import (
     packaged_surrogate,
     piece_traits,
     predictions,
+    save_surrogate,
     site_of,
     solid_relations,
 )
@@ -397,7 +398,7 @@ def test_the_loads_at_points_of_published_blasts_are_within_what_a_network_may_s
 
 def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     surrogate = by_hand()
-    path = surrogate.save(tmp_path / "surrogate.json")
+    path = save_surrogate(surrogate, tmp_path / "surrogate.json")
     again = load_surrogate(str(path))
     assert again.fit == ABOUT
     charge = Charge((1.5, 4.0), 5.0)
@@ -436,7 +437,7 @@ def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_surrogate_is_refused(change: object, words: str, tmp_path: Path) -> None:
-    path = by_hand().save(tmp_path / "surrogate.json")
+    path = save_surrogate(by_hand(), tmp_path / "surrogate.json")
     content = json.loads(path.read_text())
     assert callable(change)
     change(content)
@@ -864,7 +865,7 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     table = pq.read_table("docs/data/close_site_blasts.parquet")
     names = table["scenario"].unique()[:40]
     pq.write_table(table.filter(pc.is_in(table["scenario"], names)), tmp_path / "few.parquet")
-    surrogate = packaged_surrogate().save(tmp_path / "surrogate.json")
+    surrogate = save_surrogate(packaged_surrogate(), tmp_path / "surrogate.json")
     options = ["check", str(tmp_path / "few.parquet"), "--surrogate", str(surrogate)]
     done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
     rows_of = [line.split("|")[1:-1] for line in done.output.splitlines()[2:4]]

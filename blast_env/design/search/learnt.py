@@ -19,8 +19,8 @@ from blast_env.evaluation.cases import check_loaded, one_per_charge, search_set
 from blast_env.geometry import Layout
 from blast_env.rules import layouts_by_rule
 from blast_env.site import AnyCharge, Scenario
+from blast_env.surrogate import Surrogate, packaged_surrogate
 from blast_env.surrogate.correction import Correction
-from blast_env.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.surrogate.walls import SurrogateSite, site_of
 from blast_env.values import generator
 
