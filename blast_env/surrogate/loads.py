@@ -527,7 +527,8 @@ def put_loads(
                 if not is_bare:
                     by = member * weight_rows * length
                     _put_heard(own, member, row, inputs, kept.messages, new.messages, bench, by)
-                    put_seen_of(own, member, row, inputs, kept.seen, new.seen, given)
+                    seen = kept.seen, new.seen
+                    put_seen_of(site.points, own, member, row, inputs, *seen, given)
                 # 2. Four points through the layers, from memory read once.
                 bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
                 four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)

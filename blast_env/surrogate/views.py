@@ -255,11 +255,19 @@ def put_seen(
 
 @njit(error_model="numpy", fastmath=FUSED)
 def put_seen_of(
-    own: Any, member: int, first_row: int, inputs: int, kept: Any, new: Any, given: Any
+    points: WallPoints,
+    own: Any,
+    member: int,
+    first_row: int,
+    inputs: int,
+    kept: Any,
+    new: Any,
+    given: Any,
 ) -> None:
     """Put what the views of the pieces of a layout say to a few points, added up.
 
     Args:
+        points: The points; the last one fills up rows.
         own: The layout; see `put_loads`.
         member: Number of the network.
         first_row: The first point.
@@ -273,6 +281,12 @@ def put_seen_of(
     at, seen, now_seen = place(given), place(kept), place(new)
     lanes = lanes_at(at)
     for number in range(first_row, first_row + ROWS_AT_ONCE):
+        end = number * inputs + inputs - sight
+        # All points of a column see the same.
+        if number >= len(points.points_m) or is_above(points.points_m, points.outward, number):
+            for index in range(0, sight, lanes):
+                store(at, end + index, load(at, end - inputs + index))
+            continue
         for index in range(0, sight, lanes):
             total = fill(at, np.float32(0.0))
             for piece in own:
@@ -284,4 +298,4 @@ def put_seen_of(
                 else:
                     entry = ((member * of_new - piece - 1) * rows + number) * sight
                     total = load(now_seen, entry + index) + total
-            store(at, number * inputs + inputs - sight + index, total)
+            store(at, end + index, total)
