@@ -474,6 +474,42 @@ def _put_heard(
             store(at, number * inputs + SHARES + above, high)
 
 
+@njit(error_model="numpy")
+def _add_loads(
+    parts: SingleArray,
+    bias: float,
+    known: FloatArray,
+    power: float,
+    points: WallPoints,
+    first_row: int,
+    owner: int,
+    loads: FloatArray,
+) -> int:
+    """Add the loads at a few points to those of their parts, by area; return the last part.
+
+    Args:
+        parts: Parts of the sums of the last layer (4, PARTS).
+        bias: Its bias.
+        known: Logarithms of Kingery and Bulmash's load (points,).
+        power: Exponent of the mean.
+        points: The points.
+        first_row: The first of them.
+        owner: Its part, or one before.
+        loads: Sums of loads to the power, times areas (parts,).
+    """
+    starts, area_m2 = points.parts, points.area_m2
+    for number in range(min(ROWS_AT_ONCE, len(area_m2) - first_row)):
+        differs = np.float32(0.0)
+        for part in range(PARTS):
+            differs += parts[number, part]
+        point = first_row + number
+        while owner + 1 < len(starts) and point >= starts[owner + 1]:
+            owner += 1
+        over = min(max(differs + bias, LEAST_OVER), MOST_OVER)
+        loads[owner] += area_m2[point] * exp(power * (known[point] + over))
+    return owner
+
+
 @compiled(nogil=True, error_model="numpy", fastmath=FUSED)
 def put_loads(
     layouts: Any,
@@ -498,7 +534,7 @@ def put_loads(
     own_frame()
     starts, area_m2 = site.points.parts, site.points.area_m2
     members, rows, width = base.shape
-    points, given = len(area_m2), bench.given
+    given = bench.given
     length, sight = new.messages.shape[3], new.seen.shape[3]
     at, to, beside = place(given), place(bench.between), place(bench.beyond)
     sums, weight_rows, same = place(bench.parts), 0, (0, 0, 0, 0)
@@ -517,7 +553,7 @@ def put_loads(
             )
         for member in range(members):
             bases, to_first = place(base[member]), place(layers.first[member])
-            to_second, bias = place(layers.second[member]), place(layers.second_bias[member])
+            to_second, second = place(layers.second[member]), place(layers.second_bias[member])
             to_last = place(layers.last[member])
             power, known = layers.powers[member], charge.logs[layers.kinds[member]]
             loads[:] = 0.0
@@ -532,20 +568,12 @@ def put_loads(
                 # 2. Four points through the layers, from memory read once.
                 bases_of = row * width, (row + 1) * width, (row + 2) * width, (row + 3) * width
                 four_rows(at, row * inputs, inputs, to_first, width, bases, bases_of, to, 0)
-                four_rows(to, 0, width, to_second, beyond, bias, same, beside, 0)
+                four_rows(to, 0, width, to_second, beyond, second, same, beside, 0)
                 # 3. L = (sum of A L_i^p / sum of A)^(1 / p): p = 1 is the mean, a large p nearly
                 # the largest.
                 put_parts(beside, beyond, to_last, sums)
-                for number in range(min(ROWS_AT_ONCE, points - row)):
-                    differs = np.float32(0.0)
-                    for part in range(PARTS):
-                        differs += bench.parts[number, part]
-                    point = row + number
-                    while owner + 1 < len(starts) and point >= starts[owner + 1]:
-                        owner += 1
-                    over = min(max(differs + layers.last_bias[member], LEAST_OVER), MOST_OVER)
-                    of_point = known[point] + over
-                    loads[owner] += area_m2[point] * exp(power * of_point)
+                bias = layers.last_bias[member]
+                owner = _add_loads(bench.parts, bias, known, power, site.points, row, owner, loads)
             for owner in range(len(starts)):
                 of_owner = log(loads[owner] / areas_m2[owner]) / power
                 found[member, first_layout + layout, owner] = of_owner
