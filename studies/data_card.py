@@ -35,6 +35,7 @@ _ORIGINS: Final = {
     "further_site_blasts": "further kerbs, streets, courts and short fronts, and such layouts",
     "later_site_blasts": "further ones of these kinds, two thirds with loads at points of walls",
     "strong_site_blasts": "close, front, square, street and kerb sites; layouts that take off much",
+    "screened_site_blasts": "low buildings, lanes, streets and squares; layouts that take off much",
 }
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 _TRUTHS: Final = ("protected",)

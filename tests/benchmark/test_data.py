@@ -46,8 +46,10 @@ def test_loads_at_points_are_beside_those_of_structures(rows: pd.DataFrame) -> N
             [load for load in json.loads(row[name]) if load is not None]
             for name in ("point_impulses_pa_s", "point_peaks_pa")
         )
-        assert min(impulses) <= row["impulse_pa_s"] <= max(impulses)
-        assert max(peaks) == pytest.approx(row["peak_pa"], rel=1e-3)
+        # They have three digits, some after four.
+        rounded = 1.0 + 5.5e-3
+        assert min(impulses) / rounded <= row["impulse_pa_s"] <= max(impulses) * rounded
+        assert max(peaks) == pytest.approx(row["peak_pa"], rel=rounded - 1.0)
 
 
 def test_tensors_leave_out_what_has_no_bare_load(rows: pd.DataFrame) -> None:

@@ -24,6 +24,7 @@ TABLES: Final = (
     "further_site_blasts",
     "later_site_blasts",
     "strong_site_blasts",
+    "screened_site_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
