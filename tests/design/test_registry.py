@@ -32,7 +32,7 @@ from tests.design.corner import fill_from_the_corner
 from tests.design.one_after_another import OneAfterAnother
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut
-from tests.surrogate.test_surrogate import YARD, by_hand
+from tests.surrogate.cases import YARD, by_hand
 
 OWN = {
     "corner": ProposerRow(

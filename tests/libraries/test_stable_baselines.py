@@ -18,7 +18,7 @@ from tests.catalogue_sites import ITEMS
 from tests.envs.small import same, small_scenario
 from tests.libraries.ids import BARRIER_IDS, arguments
 from tests.office_park import office_park
-from tests.surrogate.test_surrogate import by_hand
+from tests.surrogate.cases import by_hand
 
 pytestmark = pytest.mark.slow
 _STEPS = 4
