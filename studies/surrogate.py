@@ -38,7 +38,14 @@ from blast_env.statistics import mean_estimate, reductions
 from blast_env.surrogate.ensemble import Surrogate
 from blast_env.surrogate.fit_record import Check, Fit
 from blast_env.surrogate.fitting import fit
-from blast_env.surrogate.holdout import Errors, Predictions, errors_of, folds, predictions
+from blast_env.surrogate.holdout import (
+    Errors,
+    Predictions,
+    errors_of,
+    folds,
+    load_errors,
+    predictions,
+)
 from blast_env.surrogate.intervals import (
     COVERAGE,
     IMPULSE_LEAST_SPREAD,
@@ -393,6 +400,43 @@ def check(
                 impulse, peak = map(_covered, told, of_both, records)
                 coverage.append(_coverage_table(wide, every, (impulse, peak), str))
         print_line("\n\n".join((_errors_table(found), *coverage)))
+
+
+@app.command()
+def gap(
+    surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
+    data: Annotated[list[Path] | None, typer.Option(help="Tables of its fit.")] = None,
+    sites: Annotated[int, typer.Option(min=1, help="How many of each, at most.")] = 600,
+    every: Annotated[int, typer.Option(min=2, help="As for the fit.")] = EVERY,
+    seed: Annotated[int, typer.Option(help="As for the fit.")] = 0,
+) -> None:
+    """Print the errors on sites that a fit held out, and on as many of its own.
+
+    Data are missing where a surrogate errs less on its own sites; else it is too small, or is told
+    too little.
+    """
+    with user_errors():
+        loaded, named, found = load_surrogate(surrogate), named_rows(data or DATA), {}
+        for what, names in zip(
+            ("held-out sites", "of the fit"), _parts(named, every, seed), strict=True
+        ):
+            drawn = np.random.default_rng(seed).permutation(names)[:sites]
+            rows = named[named["scenario_hash"].isin(drawn)]
+            wide, close = samples_of(rows, WIDE), samples_of(rows)
+            chosen = np.ones(len(wide), dtype=bool)
+            found[f"{len(drawn)} {what}"] = (
+                load_errors(loaded, loaded.impulse, wide, wide.impulse, chosen),
+                load_errors(loaded, loaded.peak, close, close.peak, chosen),
+            )
+        print_line(_errors_table(found))
+
+
+def _parts(named: pd.DataFrame, every: int, seed: int) -> tuple[list[str], list[str]]:
+    """Return the hashes of the sites that a fit holds out, and of its own."""
+    is_known = named["protected"] & (named["impulse_pa_s"] > 0.0) & (named["peak_pa"] > 0.0)
+    hashes = np.unique(named.loc[is_known, "scenario_hash"].to_numpy(dtype=str))
+    held_out = folds(np.arange(len(hashes)), every, seed)[0]
+    return hashes[held_out].tolist(), hashes[~held_out].tolist()
 
 
 def _covered(found: Predictions, loads: Loads, record: Check) -> Covered:

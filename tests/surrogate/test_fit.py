@@ -192,6 +192,21 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     assert np.mean([float(line[3].strip(" %")) for line in coverage]) > 85.0
 
 
+def test_errors_on_held_out_sites_stand_beside_those_on_sites_of_the_fit(tmp_path: Path) -> None:
+    table = pq.read_table("docs/data/close_site_blasts.parquet")
+    names = table["scenario"].unique()[:12]
+    few, surrogate = tmp_path / "few.parquet", tmp_path / "surrogate.json"
+    pq.write_table(table.filter(pc.is_in(table["scenario"], names)), few)
+    save_surrogate(packaged_surrogate(), surrogate)
+    options = ["gap", "--data", str(few), "--surrogate", str(surrogate), "--every", "4"]
+    done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
+    rows = [line.split("|")[1:-1] for line in done.output.splitlines()[2:]]
+    held_out, own = "3 held-out sites", "9 of the fit"
+    wanted = [f"{kind} on {where}" for where in (held_out, own) for kind in ("impulse", "peak")]
+    assert [row[0].strip() for row in rows] == wanted
+    assert all(0.0 < float(row[1]) < 0.3 for row in rows)
+
+
 def test_a_fit_with_too_few_sites_for_intervals_is_refused_before_it_begins(tmp_path: Path) -> None:
     table = pq.read_table("docs/data/close_site_blasts.parquet")
     names = table["scenario"].unique()[:20]
