@@ -208,6 +208,9 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.surrogate blasts --kind square_sites --sites 100 --layouts 8 --rules 7"
     " --surrogate surrogate.json --favourites 5 --changes 100 --draws 5 --threats 2 --cache"
     " blasts": ("--sites 1 --layouts 1 --rules 1 --favourites 1 --draws 1 --threats 1"),
+    "python -m studies.surrogate gap --surrogate surrogate.json --sites 300": (
+        "--data docs/data/close_site_blasts.parquet"
+    ),
     "python -m studies.learning_curve --epochs 16": (
         "--data docs/data/close_site_blasts.parquet --other docs/data/many_site_blasts.parquet"
         " --epochs 1 --share 1.0"
