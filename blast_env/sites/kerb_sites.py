@@ -215,18 +215,16 @@ def street_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 1)))
-    across_m, along_m = draws.length_m(STREET_ACROSS_M), draws.length_m(STREET_ALONG_M)
-    ranges = KerbSiteRanges(
-        across_m=across_m,
-        along_m=along_m,
+    return _site_of_kind(
+        seed,
+        1,
+        (STREET_ACROSS_M, STREET_ALONG_M),
         opposite_probability=1.0,
         wing_probability=0.0,
         vehicle_probability=1.0,
         kerb_m=(0.0, 2.0),
         zone_from_charge_m=(0.5, 1.0),
     )
-    return generate_site(seed, ranges)
 
 
 def court_site(seed: int) -> Scenario:
@@ -240,11 +238,10 @@ def court_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 2)))
-    across_m, along_m = draws.length_m(COURT_ACROSS_M), draws.length_m(COURT_ALONG_M)
-    ranges = KerbSiteRanges(
-        across_m=across_m,
-        along_m=along_m,
+    return _site_of_kind(
+        seed,
+        2,
+        (COURT_ACROSS_M, COURT_ALONG_M),
         tnt_kg=(30.0, 150.0),
         depth_m=(2.0, 6.0),
         front_share=(0.35, 0.75),
@@ -254,7 +251,6 @@ def court_site(seed: int) -> Scenario:
         all_faces_probability=0.5,
         vehicle_probability=0.2,
     )
-    return generate_site(seed, ranges)
 
 
 def square_site(seed: int) -> Scenario:
@@ -268,11 +264,10 @@ def square_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 3)))
-    across_m, along_m = draws.length_m(SQUARE_ACROSS_M), draws.length_m(SQUARE_ALONG_M)
-    ranges = KerbSiteRanges(
-        across_m=across_m,
-        along_m=along_m,
+    return _site_of_kind(
+        seed,
+        3,
+        (SQUARE_ACROSS_M, SQUARE_ALONG_M),
         tnt_kg=(50.0, 150.0),
         front_share=(0.2, 0.5),
         second_probability=0.6,
@@ -282,7 +277,6 @@ def square_site(seed: int) -> Scenario:
         kerb_m=(0.0, 4.0),
         zone_from_charge_m=(0.5, 2.0),
     )
-    return generate_site(seed, ranges)
 
 
 def low_site(seed: int) -> Scenario:
@@ -296,11 +290,10 @@ def low_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 4)))
-    across_m, along_m = draws.length_m(LOW_ACROSS_M), draws.length_m(LOW_ALONG_M)
-    ranges = KerbSiteRanges(
-        across_m=across_m,
-        along_m=along_m,
+    return _site_of_kind(
+        seed,
+        4,
+        (LOW_ACROSS_M, LOW_ALONG_M),
         tnt_kg=(40.0, 150.0),
         front_height_m=(2.5, 4.5),
         front_share=(0.25, 0.6),
@@ -311,7 +304,6 @@ def low_site(seed: int) -> Scenario:
         vehicle_probability=0.2,
         kerb_m=(2.0, 6.0),
     )
-    return generate_site(seed, ranges)
 
 
 def lane_site(seed: int) -> Scenario:
@@ -325,11 +317,10 @@ def lane_site(seed: int) -> Scenario:
     Raises:
         BlastEnvError: As `generate_site`.
     """
-    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), 5)))
-    across_m, along_m = draws.length_m(LANE_ACROSS_M), draws.length_m(LANE_ALONG_M)
-    ranges = KerbSiteRanges(
-        across_m=across_m,
-        along_m=along_m,
+    return _site_of_kind(
+        seed,
+        5,
+        (LANE_ACROSS_M, LANE_ALONG_M),
         tnt_kg=(40.0, 150.0),
         depth_m=(2.0, 3.0),
         front_share=(0.2, 0.45),
@@ -341,7 +332,20 @@ def lane_site(seed: int) -> Scenario:
         kerb_m=(0.0, 2.0),
         zone_from_charge_m=(0.5, 1.0),
     )
-    return generate_site(seed, ranges)
+
+
+def _site_of_kind(seed: int, kind: int, size_m: tuple[Span, Span], **values: Any) -> Scenario:
+    """Return a site of a size that the seed draws.
+
+    Args:
+        seed: As for `generate_site`.
+        kind: Number of the kind, so that no two kinds draw the same sizes.
+        size_m: Ranges of its size across and along, m.
+        **values: Ranges in which it differs from sites along a kerb.
+    """
+    draws = Draws(np.random.default_rng((checked_seed(seed), len(_HEIGHTS_M), kind)))
+    across_m, along_m = map(draws.length_m, size_m)
+    return generate_site(seed, KerbSiteRanges(across_m=across_m, along_m=along_m, **values))
 
 
 def _draw_plan(draws: Draws, ranges: KerbSiteRanges) -> KerbSitePlan:
