@@ -59,8 +59,6 @@ SHOWN_KINDS: Final = {
     "street_sites": (1, 10_000),
     "court_sites": (1, 10_000),
     "square_sites": (1, 10_000),
-    "low_sites": (1, 10_000),
-    "lane_sites": (1, 10_000),
     "sites": (1, 10_000),
 }
 """Sites of each kind in a round of the training, and the seed of the first one.
