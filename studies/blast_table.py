@@ -25,6 +25,7 @@ from blast_env.parquet import SUFFIX, read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.site import Scenario, bundled_scenarios
 from blast_env.sites import ITEM_SITES
+from blast_env.surrogate.samples import UNKNOWN
 from blast_env.tables import Column, table_of
 from studies.site_names import scenario_of, site_names
 
@@ -67,9 +68,6 @@ BLAST: Final = (
     "engine",
 )
 """Columns that tell one blast from another."""
-
-UNKNOWN: Final = "[]"
-"""Loads at points that were not recorded."""
 
 _AT_POINTS: Final = ("point_impulses_pa_s", "point_peaks_pa")
 _DIGITS: Final = 3

@@ -16,6 +16,7 @@ from blast_env.benchmark.data import TABLES, load
 from blast_env.cli.output import user_errors
 from blast_env.errors import import_extra
 from blast_env.files import write_text
+from blast_env.surrogate.samples import UNKNOWN
 from blast_env.tables import Column
 from studies.blast_table import COLUMNS
 
@@ -116,7 +117,7 @@ def contents() -> str:
     rows = load()
     key = ["scenario_hash", "layout", *_CHARGE]
     blasts, pointed = (
-        own.groupby(key).ngroups for own in (rows, rows[rows["point_impulses_pa_s"] != "[]"])
+        own.groupby(key).ngroups for own in (rows, rows[rows["point_impulses_pa_s"] != UNKNOWN])
     )
     sites = rows.drop_duplicates("scenario_hash")["split"].value_counts()
     known = rows["unprotected_impulse_pa_s"].notna().mean()

@@ -19,11 +19,11 @@ from blast_env.parquet import SUFFIX, read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.site import AnyStructure, Scenario
 from blast_env.surrogate import WallPoints
+from blast_env.surrogate.samples import UNKNOWN
 from blast_env.tables import table_of
 from studies.blast_table import (
     BLAST,
     COLUMNS,
-    UNKNOWN,
     joined,
     load_row,
     named,

@@ -29,7 +29,7 @@ from blast_env.surrogate.walls import SurrogateSite, site_of
 _BLOCK: Final = 2**24
 """Numbers of relations, or of views, that are copied at once."""
 
-_UNKNOWN: Final = "[]"
+UNKNOWN: Final = "[]"
 """Loads at points that were not recorded."""
 
 _LEAST_LOAD: Final = 1.0
@@ -137,7 +137,7 @@ class Samples:
         # 2. The samples in a row, and the cases in which layouts compete.
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         counts = np.array([len(feature) for feature in features])
-        unknown = [_UNKNOWN] * len(rows)
+        unknown = [UNKNOWN] * len(rows)
         impulses_at, peaks_at = (
             _at_points(rows[name] if spacing == CLOSE else unknown, counts)
             for name in ("point_impulses_pa_s", "point_peaks_pa")
@@ -291,7 +291,7 @@ def _at_points(texts: Iterable[str], counts: IntArray) -> SingleArray:
     """
     found = np.full(counts.sum(), np.nan, dtype=np.float32)
     for text, end, count in zip(texts, np.cumsum(counts).tolist(), counts.tolist(), strict=True):
-        if text == _UNKNOWN:
+        if text == UNKNOWN:
             continue
         loads = np.array(json.loads(text), dtype=np.float64)
         if len(loads) != count:
