@@ -23,7 +23,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
-from blast_env.answers.terminal import print_line, print_table
+from blast_env.answers.terminal import print_line
 from blast_env.arrays import FloatArray
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -36,6 +36,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.site import AnyCharge, Charge, Scenario, VehicleCharge, VehicleSource
 from blast_env.sites import FAMILIES, Ranges, SiteSource
 from blast_env.statistics import mean_estimate
+from blast_env.tables import markdown_table
 
 HELD_OUT: Final = range(10_000, 10_048)
 """Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
@@ -413,7 +414,7 @@ def main(
                 rows.append(judgement.row())
                 if out is not None and judge is not gas:
                     save_figure(picture(curves, judgement.levels), out)
-    print_table("reduction, %", HEADERS, rows, 2)
+    print_line("\nReductions, %:\n\n" + markdown_table(HEADERS, rows))
 
 
 if __name__ == "__main__":
