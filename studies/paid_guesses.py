@@ -41,7 +41,7 @@ class UpperEnds(Surrogate):
 
 @dataclass(frozen=True)
 class PaysUpperEnds(Setting):
-    """Pays by the upper ends of intervals, where the networks disagree less than by the guess."""
+    """Pays by the upper ends of intervals: less than the guess where the networks disagree."""
 
     @cached_property
     def training(self) -> SurrogateEngine:
@@ -59,6 +59,8 @@ class PaysLeads(Setting):
         env = super().learning(seed)
         if not isinstance(env, BlastBarrierEnv):
             raise BlastEnvError(f"{self.scenario}: must be one site, in one environment")
+        if env.task.source.representative.vehicles:
+            raise BlastEnvError(f"{self.scenario}: has a vehicle, whose place hangs on the layout")
         return LeadOnRules(env)
 
 

@@ -58,9 +58,12 @@ def test_upper_ends_are_above_guesses_and_take_off_less_where_networks_disagree(
     assert len(np.unique((high / plain).round(6))) > 1
 
 
-def test_a_family_has_no_leads() -> None:
-    with pytest.raises(BlastEnvError, match="item_sites: must be one site"):
-        settings("item_sites")["the guess less that of the best rule"].learning(seed=0)
+@pytest.mark.parametrize(
+    ("site", "why"), [("item_sites", "must be one site"), ("hotel_forecourt", "has a vehicle")]
+)
+def test_families_and_vehicles_have_no_leads(site: str, why: str) -> None:
+    with pytest.raises(BlastEnvError, match=f"{site}: {why}"):
+        settings(site)["the guess less that of the best rule"].learning(seed=0)
 
 
 def test_a_row_has_means_over_trainings_and_leads() -> None:
